@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
   dataset::OpenOptions options;
   options.cameras_folder = pipelines / "cameras";
 
-  // Expected failures are values: a Result holds what was asked for or an Error with a message for people.
+  // Expected failures are values: a Result holds the requested value or an Error with a message for people.
   const auto source = pipeline::open_input(argv[1], options, pipelines / "scenes", executor, *log);
   if (!source) {
     std::fprintf(stderr, "%s\n", source.error().message.c_str());

@@ -30,7 +30,7 @@ int main(int argc, char** argv) {
   dataset::OpenOptions options;
   options.cameras_folder = pipelines / "cameras";
 
-  // The chain first: a wrong key is told at once, with file, line and column.
+  // Load the chain first: a wrong key is reported at once, with file, line and column.
   const auto chain = cloud::FilterChain::load(argv[3], cloud::builtin_filters());
   if (!chain) return fail(chain.error());
 

@@ -106,7 +106,7 @@ void split_component(Map& map, KeyframeId first) {
   const std::set<KeyframeId> all = members(map, root);
   const auto is_later = [&](KeyframeId id) { return id.robot == first.robot && !(id < first); };
 
-  // The tree: what hangs on the other side hangs on the new root, or on the old one.
+  // Tree: keyframes with a parent on the other side are attached to the new root, or to the old one.
   map.detach(first);
   for (const KeyframeId id : all) {
     const KeyframeId parent = map.parent(id);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The spanning tree: every keyframe but a root hangs on one that shared much with it.
+// The spanning tree: the parent of every keyframe but a root shared much with it.
 #include <algorithm>
 #include <stdexcept>
 
@@ -9,7 +9,7 @@ namespace plumbline::maps {
 
 void Map::attach(KeyframeId id) {
   const auto near = covisible(id, 1);
-  // Only what was there before: a keyframe that already hangs on this one would close a cycle.
+  // Only earlier keyframes are candidates: one that already descends from this one would close a cycle.
   for (const auto& [other, shared] : near) {
     if (other.robot != id.robot || other < id) {
       set_parent(id, other);

@@ -16,8 +16,8 @@ namespace fs = std::filesystem;
 
 constexpr std::uintmax_t kMegabyte = 1'000'000;
 constexpr std::uintmax_t kLeastFreeMb = 64;
-/// In every OUT.partial and locked by its run, so that what an interrupted run left behind can be told from
-/// anything else, and from a run that is still going on.
+/// File in every OUT.partial, locked by its run: it distinguishes the remains of an interrupted run from
+/// anything else, and from a run that is still active.
 const char* const kMarker = ".plumbline-unfinished";
 
 fs::path with_ending(const fs::path& folder, const char* ending) {

@@ -130,7 +130,7 @@ void fields(Io& io, KeyframeEdge& edge) {
   io(edge.a, edge.b, edge.b_from_a, edge.information);
 }
 
-/// A surface edge with its number, which tells a row that holds another's bytes.
+/// A surface edge with its number, by which a row with another edge's bytes is detected.
 struct EdgeRow {
   std::uint64_t number = 0;
   SurfaceEdge edge;

@@ -110,7 +110,7 @@ void StoreReader::read_ahead() const {
 #ifdef POSIX_FADV_WILLNEED
   constexpr off_t kPart = 4 << 20;
   const int file = ::open(impl_->file.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) return;  // who reads will tell
+  if (file < 0) return;  // the read will report it
   const off_t size = ::lseek(file, 0, SEEK_END);
   for (off_t at = 0; at < size; at += kPart) ::posix_fadvise(file, at, kPart, POSIX_FADV_WILLNEED);
   ::close(file);

@@ -169,7 +169,7 @@ StoreReplica::~StoreReplica() {
   impl_->roll_back();
   const auto left =
       guarded(impl_->file, ErrorKind::kOutput, [&] { impl_->database->run("PRAGMA journal_mode = DELETE"); });
-  (void)left;  // it fails while somebody reads; then file and log together are complete
+  (void)left;  // fails while another program reads; then file and log together are complete
 }
 
 core::Result<StoreReplica> StoreReplica::open(const std::filesystem::path& file) {

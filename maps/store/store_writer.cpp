@@ -31,8 +31,9 @@ void use_memory(Database& database) {
   database.run("PRAGMA synchronous = OFF");
 }
 
-/// One file again, that opens in a folder that may not be written. Where that cannot be, for somebody goes on
-/// reading the store, file and log together are whole as well. SQLite itself does not wait here.
+/// Makes it one file again, which can be opened in a read-only folder. If that is impossible because another
+/// program is reading the store, file and log together are complete as well. SQLite itself does not wait
+/// here.
 void leave_one_file(Database& database) {
   constexpr int kTries = 200;
   constexpr std::chrono::milliseconds kBetween(10);
@@ -147,7 +148,7 @@ struct StoreWriter::Impl {
   std::int64_t transaction;  ///< the number of the last one, or of the one that is going on
   Mirror maps, keyframes, states, points, lines, edges, frames, log;
   std::vector<RobotInfo> robots;  ///< as in the file
-  /// Keyframes and edges were made anew, for another camera: what is in the file is not kept.
+  /// Keyframes and edges were recomputed for another camera: those in the file are not kept.
   bool anew = false;
   ByRobot<FramePose> frame_lists;  ///< as in the file
   ByRobot<std::string> log_lines;  ///< as in the file

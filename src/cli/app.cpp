@@ -197,7 +197,7 @@ int run(int argc, char** argv) {
 
   ignore_write_signals();
   cv::setNumThreads(1);                                     // threads come from the executor alone
-  pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // what fails is told by the step that called PCL
+  pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // the step that called PCL reports failures
 
   try {
     return session.command();

@@ -41,7 +41,7 @@ struct Session {
   const core::Executor& executor();
   /// Prints the error and gives its exit code.
   int fail(const core::Error& error);
-  /// Ends the progress of a run, tells what it came to, which wrote `output`, and gives its exit code.
+  /// Ends the progress of a run, prints its result, which wrote `output`, and returns its exit code.
   int finish(const core::Result<pipeline::RunSummary>& summary, const std::filesystem::path& output);
 
  private:

@@ -90,7 +90,7 @@ void Console::put_line(std::size_t done, std::size_t total, const char* what, do
     nlohmann::ordered_json object = {{"event", "progress"}, {"what", what},       {"done", done},
                                      {"total", total},      {"per_second", rate}, {"seconds_left", left_s},
                                      {"seconds", elapsed_s}};
-    if (total == 0) object["total"] = object["seconds_left"] = nullptr;  // of what is live nobody knows
+    if (total == 0) object["total"] = object["seconds_left"] = nullptr;  // not known for live sources
     put(object.dump() + "\n");
     return;
   }

@@ -26,18 +26,18 @@ class Console : public core::Log {
 
   void write(core::LogLevel level, const std::string& message) override;
 
-  /// A bar with rate and time left on a terminal, a line every few seconds elsewhere, an object a second as
-  /// JSON; nothing when quiet. `total` 0: nobody knows.
+  /// Shows a bar with rate and time left on a terminal, a line every few seconds elsewhere, or one object per
+  /// second as JSON; nothing when quiet. `total` 0: not known.
   void progress(std::size_t done, std::size_t total, const char* what);
-  /// progress() for those who only tell how much is done.
+  /// progress() as a function for work that only reports its counts.
   [[nodiscard]] std::function<void(std::size_t, std::size_t)> counting(const char* what) {
     return [this, what](std::size_t done, std::size_t total) { progress(done, total, what); };
   }
   /// One line that is kept up on a terminal, a line every few seconds elsewhere; nothing when quiet. While
   /// there is a bar, it stands behind that.
   void status(const std::string& line);
-  /// The work that is left once all is counted: "refine". Shown as status() is; told as JSON and to logs at
-  /// once.
+  /// Shows the work that remains once all is counted, such as "refine": like status() on a terminal; JSON and
+  /// logs get it at once.
   void step(const std::string& name);
   [[nodiscard]] std::function<void(const std::string&)> stepping() {
     return [this](const std::string& name) { step(name); };

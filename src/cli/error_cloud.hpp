@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A cloud whose colour tells its error, as a file and as a picture.
+// A cloud coloured by its error, as a file and as a picture.
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -12,10 +12,10 @@
 
 namespace plumbline::cli {
 
-/// <file>.ply: float x y z [nx ny nz] error (metres), and colours; <file>.png: a picture of it with a colour
-/// bar in millimetres. Colours reach from 0 to the 98th percentile of the error, rounded up. The folder is
-/// made if missing. `error_m`: one a point, NaN = not measured; `cameras`: in the frame of the cloud, tell
-/// which way is up. Errors: kOutput.
+/// Writes <file>.ply: float x y z [nx ny nz] error (metres), and colours; <file>.png: a picture of it with a
+/// colour bar in millimetres. Colours reach from 0 to the 98th percentile of the error, rounded up. The
+/// folder is made if missing. `error_m`: one per point, NaN = not measured; `cameras`: in the frame of the
+/// cloud, to find out which way is up. Errors: kOutput.
 core::Result<void> write_error_cloud(const std::filesystem::path& file, const std::string& title,
                                      const evaluate::SurfaceSamples& cloud, const std::vector<float>& error_m,
                                      const std::vector<geometry::Trajectory>& cameras);

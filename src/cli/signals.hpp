@@ -9,7 +9,7 @@ namespace plumbline::cli {
 /// program.
 const core::StopToken& stop_on_signals();
 
-/// A full disk's or a closed pipe's signal becomes an error of the write, which can be told.
+/// Turns the signal of a full disk or a closed pipe into an error of the write, which can be reported.
 void ignore_write_signals();
 
 }  // namespace plumbline::cli

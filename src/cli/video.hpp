@@ -8,7 +8,7 @@
 
 namespace plumbline::cli {
 
-/// True if the file's name asks for a film: .gif or .mp4.
+/// True if the file is a film by its name: .gif or .mp4.
 bool is_film(const std::filesystem::path& file);
 
 /// "" or why films cannot be made here.

@@ -139,7 +139,7 @@ static std::string joined(const std::vector<std::string>& names) {
 }
 
 std::string hint(const std::string& word, const std::vector<std::string>& allowed) {
-  constexpr std::size_t kReadable = 16;  // names; nobody looks for one among a hundred
+  constexpr std::size_t kReadable = 16;  // names; a list of a hundred would not be read
   const std::string near = did_you_mean(word, allowed);
   const std::string meant = near.empty() ? "" : fmt::format("; did you mean {}?", near);
   if (allowed.size() <= kReadable)

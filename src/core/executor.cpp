@@ -23,7 +23,7 @@ struct Executor::Impl {
         arena(threads) {
     arena.initialize();
   }
-  tbb::global_control allowed;  ///< more threads than cores are given when they are asked for
+  tbb::global_control allowed;  ///< allows more threads than cores if requested
   mutable tbb::task_arena arena;
   mutable tbb::task_group beside;  ///< submitted jobs
 };
@@ -93,7 +93,7 @@ Executor::Job::~Job() {
   if (!state_) return;
   try {
     wait();
-  } catch (...) {  // a result nobody asked for
+  } catch (...) {  // nobody waits for this result
   }
 }
 bool Executor::Job::valid() const { return state_ != nullptr; }

@@ -19,8 +19,8 @@ namespace {
 constexpr std::size_t kMaxBytes = 1'000'000;
 constexpr std::size_t kMaxDepth = 20;
 constexpr std::size_t kMaxNodes = 100'000;
-// yaml-cpp reads to the end of a line, and of the brackets opened in it, before it tells of anything, at some
-// 200 bytes a token; nothing that a person writes comes near these.
+// yaml-cpp reads to the end of a line, and of the brackets opened in it, before it reports anything, with
+// some 200 bytes per token; no file written by a person comes near these limits.
 constexpr int kMaxColumns = 100'000;
 constexpr int kMaxOpenBrackets = 1000;
 
@@ -291,7 +291,7 @@ std::optional<ConfigNode> read_yaml(const std::filesystem::path& file, ConfigPro
   }
   std::ifstream stream(file, std::ios::binary);
   if (!stream) return unreadable(file, "cannot be read; check its permissions", problems);
-  // One byte more than allowed is enough to tell; the file may be a device without end.
+  // Reading one byte more than allowed shows that it is too large; the file may be a device without end.
   std::string text(kMaxBytes + 1, '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (stream.bad()) return unreadable(file, "cannot be read", problems);

@@ -77,7 +77,7 @@ class AzureKinectFile {
   std::string color_mode_;
   std::string depth_mode_;
   sensor::Camera camera_;
-  std::deque<ContainerPacket> recent_;  ///< of both tracks, as images are asked for out of order
+  std::deque<ContainerPacket> recent_;  ///< of both tracks, because images are requested out of order
   std::int64_t at_us_ = -1;             ///< of the last packet that was read; -1: none
 };
 

@@ -94,7 +94,7 @@ const LayoutFormat& tartanair_layout();
 const LayoutFormat& redwood_layout();
 const LayoutFormat& azure_kinect_layout();
 
-/// In the order in which they are asked.
+/// All layouts, in the order in which they are tried.
 const std::vector<const LayoutFormat*>& layout_formats();
 
 /// The first that recognises the folder; null when none does.

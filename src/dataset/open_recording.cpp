@@ -82,7 +82,7 @@ void round_stamps(std::vector<PairInfo>& pairs) {
 }
 
 /// Keeps only the first of several frames with the same stamp, in the microseconds that trajectories are
-/// written with: their poses could not be told apart. `pairs` are sorted by stamp.
+/// written with: their poses could not be distinguished. `pairs` are sorted by stamp.
 void drop_same_stamps(const std::string& folder, std::vector<PairInfo>& pairs, core::Log& log) {
   const auto microseconds = [](const PairInfo& pair) { return std::llrint(pair.stamp * 1e6); };
   const auto same = [&](const PairInfo& a, const PairInfo& b) { return microseconds(a) == microseconds(b); };

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 constexpr std::uintmax_t kMaxScannedBytes = 65536;  // of files that may be camera files by their content
 
-/// Names that camera files have beside recordings, in the order in which they are looked for.
+/// Names that camera files have beside recordings, in the order in which they are tried.
 constexpr std::array<const char*, 16> kCameraFiles = {"camera.yaml",
                                                       "camera_intrinsic.json",
                                                       "intrinsic.json",
@@ -36,8 +36,8 @@ constexpr std::array<const char*, 16> kCameraFiles = {"camera.yaml",
                                                       "../cam_params.json"};
 constexpr std::size_t kMustBeCameras = 3;  // of these names; the others may be notes of any kind
 
-/// YAML and JSON files of the folder that another program's camera is in; none where there are so many of
-/// them that they are one for each image.
+/// YAML and JSON files of the folder that contain another program's camera; none if there are so many that
+/// they are one for each image.
 std::vector<fs::path> foreign_camera_files(const fs::path& folder) {
   constexpr std::size_t kFew = 32;
   std::vector<fs::path> candidates;

@@ -56,7 +56,7 @@ class VideoFrames {
   const VideoDecoder* decoder_ = nullptr;
   void* video_ = nullptr;
   std::int64_t next_ = 0;
-  std::map<std::int64_t, cv::Mat> recent_;  ///< the last few, as frames are asked for out of order
+  std::map<std::int64_t, cv::Mat> recent_;  ///< the last few, because frames are requested out of order
 };
 
 }  // namespace plumbline::dataset

@@ -14,7 +14,7 @@ namespace plumbline::exports {
 struct Format {
   std::string name;
   std::vector<std::string> endings;  ///< of the output's name; the longest that fits wins. Empty: a folder
-  std::vector<Content> contents;     ///< that it holds; the first one unless another is asked for
+  std::vector<Content> contents;     ///< that it can hold; the first one is the default
   std::string needs;                 ///< besides a map: "map.db", "recording"; empty: a cloud does
   std::string title;
   std::string description;           ///< Markdown

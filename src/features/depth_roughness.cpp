@@ -48,7 +48,7 @@ float depth_roughness(const cv::Mat& depth, int x, int y, int reach, int step) {
 float roughness_limit(std::vector<float> roughness) {
   constexpr float kRougher = 2.0F;
   constexpr float kLeast = 0.2F;    // depth without any noise has steps of rounding
-  constexpr std::size_t kFew = 30;  // places do not tell what is common: the model does
+  constexpr std::size_t kFew = 30;  // fewer samples do not show the usual roughness: the model is used
   if (roughness.size() < kFew) return kRougher;
   const auto middle = roughness.begin() + static_cast<std::ptrdiff_t>(roughness.size() / 2);
   std::nth_element(roughness.begin(), middle, roughness.end());

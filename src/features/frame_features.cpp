@@ -91,7 +91,7 @@ bool at_border(const cv::Mat& depth, const Eigen::Vector2f& pixel, float reach) 
 /// Leaves patches at depth borders empty: background and foreground move against each other there.
 void empty_patches_at_borders(const cv::Mat& depth, const OrbExtractor& extractor, OrbFeatures& orb) {
   if (depth.empty()) return;
-  constexpr int kSteps = 5;  // from the corner to the end of what is asked
+  constexpr int kSteps = 5;  // from the corner to the end of the tested range
   std::vector<float> roughness;
   std::vector<std::size_t> asked;
   for (std::size_t i = 0; i < orb.points.size(); ++i) {
@@ -181,7 +181,7 @@ CornerDepth corner_depth(const cv::Mat& depth, float x, float y) {
   if (farthest - nearest > tolerance) return {};
   const Eigen::Vector3f plane = normal.ldlt().solve(right);
   const float z = 1.0F / plane.x();
-  // Too few beside each other to tell a slant.
+  // Too few neighbouring measurements to determine a slant.
   if (!(z >= nearest - tolerance && z <= farthest + tolerance)) return {};
   return {z, plane.tail<2>()};
 }

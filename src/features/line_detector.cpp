@@ -19,7 +19,7 @@ constexpr double kHalfScaleBlur = 0.5;   // px of the half image
 constexpr double kFullScaleBlur = 0.75;  // px
 constexpr float kMinResponse = 1.0F;     // grey levels per px
 
-// The image that lines are looked for in: the region at the asked scale, smoothed.
+// The image in which lines are detected: the region at the requested scale, smoothed.
 cv::Mat detection_image(const cv::Mat& region, const LineDetectorOptions& options) {
   const bool half = options.scale == LineScale::kHalf;
   cv::Mat image = region;

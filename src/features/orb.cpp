@@ -106,7 +106,7 @@ std::vector<Corner> spread(std::vector<Corner> corners, const cv::Size& size, in
 }
 
 /// True if the gradients around a pixel nearly all point the same way or its opposite (structure tensor;
-/// Harris and Stephens 1988 ask the same of one number).
+/// Harris and Stephens 1988 test the same with one number).
 bool on_edge(const cv::Mat& level, int x, int y, double min_corner) {
   constexpr int kTensorReach = 3;
   int xx = 0;

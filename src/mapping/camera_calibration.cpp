@@ -32,7 +32,7 @@ using optimize::kCameraUnknowns;
 constexpr int kParts = 4;
 constexpr int kRounds = 3;  // of linearising where the last one led
 constexpr std::size_t kLeastKeyframes = 8;
-constexpr int kLeastViewsInAll = 24;  // or so many with frames: fewer are one view again and again
+constexpr int kLeastViewsInAll = 24;  // including frames: fewer show the same view again and again
 constexpr int kLeastViews = 2;
 constexpr int kLeastObservations = 300;
 
@@ -215,7 +215,7 @@ const std::vector<Group>& groups() {
   return all;
 }
 
-/// The numbers of camera.yaml that are looked for, and what each hangs on.
+/// Numbers of camera.yaml that are estimated, and the unknown that each depends on.
 struct CameraNumber {
   const char* name;
   CameraUnknown unknown;
@@ -346,7 +346,7 @@ class Calibrator {
   optimize::CameraPrior prior_;
 };
 
-/// None: some part tells nothing.
+/// Evidence of each part; none if some part has none.
 std::optional<std::vector<CameraEvidence>> evidence_of(Parts& parts, const CameraChange& change,
                                                        const core::Executor& executor) {
   std::array<std::optional<CameraEvidence>, kParts> each;

@@ -134,7 +134,7 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& featur
     connect_keyframe(bundle);
   if (bundle_.due(frame_count_)) put_back_bundle(bundle);
 
-  // Section 3.2: the frame's pose; a lost frame is looked for in the maps of other robots, too.
+  // Section 3.2: the frame's pose; a lost frame is also searched in the maps of other robots.
   const int lost_before = tracker_.lost_frames();
   last_track_ = tracker_.track(map_, frame, features);
   const bool believed = believes_place(frame, features, lost_before);
@@ -352,8 +352,8 @@ bool Slam::give_way() {
   return true;
 }
 
-/// The component that began later moves into the frame of the other one. Nothing is changed when the pose
-/// graph takes what joins them for wrong.
+/// Moves the component that began later into the frame of the other one. Nothing is changed if the pose graph
+/// rejects what joins them.
 void Slam::join_components(core::KeyframeId keyframe) {
   if (!options_.loops.enabled || !options_.components) return;
   auto overlap = joiner_.look_up(map_, keyframe, closer_.database());

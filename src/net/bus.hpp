@@ -42,7 +42,7 @@ enum class Answer : std::uint8_t {
   kPresence,  ///< to all robots: there is a hub
   kAccepted,  ///< the robot may send
   kRefused,   ///< this run of the robot will never be accepted
-  kTrouble,   ///< the hub cannot store the rows now, and asks for them again later
+  kTrouble,   ///< the hub cannot store the rows now, and requests them again later
   kDone,      ///< the hub holds everything: the robot may leave
 };
 
@@ -103,7 +103,7 @@ class RobotBus {
   virtual std::vector<HubStatus> poll_hub() = 0;  ///< statuses addressed to other robots included
   /// Chunks of other robots' maps; the hub sends them from the first call on.
   virtual std::vector<Chunk> poll_feedback() = 0;
-  [[nodiscard]] virtual bool has_reader() = 0;    ///< somebody subscribes to this robot's chunks
+  [[nodiscard]] virtual bool has_reader() = 0;    ///< a hub subscribes to this robot's chunks
   [[nodiscard]] virtual bool all_received() = 0;  ///< every subscriber has acknowledged all sent chunks
   [[nodiscard]] virtual int participants() = 0;   ///< others on the network, of any kind
   virtual void wait(std::chrono::milliseconds most) = 0;

@@ -30,7 +30,7 @@ class FitSum {
     ++fit_.fitting;
     sum_ += squared;
   }
-  /// Each square was that of so many coordinates.
+  /// Fit if each square is that of `coordinates` coordinates.
   [[nodiscard]] BundleFit fit(int coordinates) const {
     BundleFit fit = fit_;
     if (fit.fitting > 0) fit.rms = std::sqrt(sum_ / (coordinates * static_cast<double>(fit.fitting)));

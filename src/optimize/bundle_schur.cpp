@@ -92,7 +92,7 @@ bool SchurComplement::solve(NormalEquations& equations, double radius) {
 }
 
 /// With S = L L^T they are X^T X, L X = the pose's columns of the identity, of which only rows from the pose
-/// on are not zero. Several poses at a time, as each asks for all of L.
+/// on are not zero. Several poses are solved at a time, as each needs all of L.
 std::vector<Matrix6d> SchurComplement::inverse_blocks(NormalEquations& equations) {
   constexpr int kAtATime = 16;
   assemble(equations, std::numeric_limits<double>::infinity());

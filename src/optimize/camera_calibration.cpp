@@ -58,7 +58,7 @@ struct RowPoint {
   }
 };
 
-/// Rows of derivatives by the camera, by the step and by the point, where they are asked for.
+/// Rows of derivatives with respect to the camera, the step and the point, if requested.
 template <int kRows>
 class Derivatives {
  public:
@@ -163,7 +163,7 @@ class DepthCost final : public ceres::SizedCostFunction<1, kCameraUnknowns, kSte
 
 constexpr std::size_t kSteps = kStep;
 
-/// All unknowns in one buffer, for the order of Ceres' sums hangs on addresses.
+/// All unknowns in one buffer, because the order of Ceres' sums depends on addresses.
 class CameraUnknowns {
  public:
   CameraUnknowns(const CalibrationProblem& problem, const CameraChange& change)

@@ -14,8 +14,8 @@
 
 namespace plumbline::optimize {
 
-/// J^T J of parameters: what damping adds to it, and the scale it is told in. As Ceres does it: Marquardt's
-/// diagonal, of a Jacobian whose columns have been scaled once, by what they were at first.
+/// J^T J of parameters: what damping adds to it, and its scale. Like Ceres: Marquardt's diagonal, of a
+/// Jacobian whose columns have been scaled once, by their initial norms.
 template <int kUnknowns>
 struct Damping {
   using Vector = Eigen::Matrix<double, kUnknowns, 1>;

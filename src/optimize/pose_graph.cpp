@@ -27,8 +27,8 @@ constexpr double kRoundFactor = 1.6;  // how fast the loss turns from convex to 
 /// enough for directions that no edge holds.
 constexpr double kWeakInformation = 1e-3;
 
-/// The graph as Ceres wants it, with a weight for each edge that may change between solves. All poses in one
-/// array, so that the order of sums does not hang on where the heap puts them; the last one is the world.
+/// The graph as a problem for Ceres, with a weight for each edge that may change between solves. All poses
+/// are in one array, so that the order of sums does not depend on the heap; the last one is the world.
 class Solver {
  public:
   explicit Solver(const PoseGraph& graph) : graph_(graph), numbers_(kPoseBlock * (graph.poses.size() + 1)) {

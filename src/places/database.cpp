@@ -13,7 +13,7 @@ using features::FrameFeatures;
 namespace {
 
 constexpr int kMaxDivisions = 60;      // of words, a keyframe
-constexpr std::size_t kCommon = 4000;  // a word in more features than this tells nothing
+constexpr std::size_t kCommon = 4000;  // a word in more features than this does not discriminate
 constexpr double kGrowthToReweigh = 1.25;
 
 std::size_t at(std::int32_t i) { return static_cast<std::size_t>(i); }
@@ -161,7 +161,7 @@ std::vector<Hit> Database::Scores::best(std::size_t count, const std::function<b
     if (scores_[i] > 0.0F) slots.push_back(static_cast<std::int32_t>(i));
   }
 
-  // `allowed` may be dear: it is asked for the best only, a block at a time.
+  // `allowed` may be expensive: it is called only for the best candidates, a block at a time.
   const auto better = [&](std::int32_t a, std::int32_t b) {
     return std::make_pair(-ranks[at(a)], a) < std::make_pair(-ranks[at(b)], b);
   };

@@ -63,8 +63,8 @@ Tracker::PoseHypotheses Tracker::pose_hypotheses(const maps::Map& map, const sen
   return result;
 }
 
-/// Before a bare wall thumbnails fit anywhere, and the motion model lags behind: grain tells which hypothesis
-/// is the best, or how far to the side of it the camera looks.
+/// In front of a bare wall thumbnails fit anywhere, and the motion model lags behind: fine texture shows
+/// which hypothesis is the best, or how far to the side of it the camera looks.
 void Tracker::rank_by_intensity(const maps::Map& map, const PhotometricView& view,
                                 PoseHypotheses& hypotheses) const {
   constexpr std::size_t kCoarse = 1;

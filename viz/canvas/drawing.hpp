@@ -24,7 +24,7 @@ struct Drawing {
   GlFunction (*gl_function)(const char* name);
 };
 
-/// OSMesa's function of that name; null: there is none. In the program it asks the part.
+/// OSMesa's function of that name; null: there is none. In the program it comes from the part.
 Drawing::GlFunction offscreen_function(const char* name);
 
 }  // namespace plumbline::viz

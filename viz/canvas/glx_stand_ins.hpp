@@ -11,7 +11,7 @@
 extern "C" {
 
 __attribute__((visibility("default"))) void* glXGetCurrentDisplay() {
-  static char any;  // GLEW only asks whether there is one
+  static char any;  // GLEW only checks that there is one
   return &any;
 }
 

@@ -79,7 +79,7 @@ void find_ranges(const SvgChart& chart, Plot& plot) {
   plot.y = chart.y_range.value_or(plot.y);
 }
 
-/// The height that the data want at this width, and one scale for both axes.
+/// Height that gives both axes one scale at this width.
 void equalise(Plot& plot) {
   const double x_span = plot.x.second - plot.x.first;
   const double y_span = plot.y.second - plot.y.first;

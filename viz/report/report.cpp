@@ -59,7 +59,7 @@ core::Result<ReportSummary> write_report(const ReportRequest& request, const cor
 
   fs::path scratch = file;
   scratch.replace_filename(fmt::format(".{}.{}.png", file.filename().string(), getpid()));
-  auto pictures = pictures_html(*data, scratch);  // first: damaged ones are told in the head
+  auto pictures = pictures_html(*data, scratch);  // first, because the head reports damaged ones
   if (!pictures) return tl::unexpected<core::Error>(pictures.error());
 
   auto viewer = viewer_html(*data, request, executor, log);

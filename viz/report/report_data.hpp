@@ -71,7 +71,7 @@ struct ReportData {
   std::vector<ReportFrames> frames;
   std::vector<LostStretch> lost;
   std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> loops;  ///< keyframes that a loop or merge ties
-  std::map<std::int32_t, std::string> robot_names;                 ///< by number, as far as map.db tells
+  std::map<std::int32_t, std::string> robot_names;                 ///< by number, as far as map.db has them
   std::optional<MapFit> fit;                                       ///< none without map.db
   std::optional<cloud::CloudFile> cloud;
   std::optional<CloudExtent> extent;            ///< none without finite points

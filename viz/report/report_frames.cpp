@@ -43,7 +43,7 @@ void sort_by_robot(ReportData& data) {
   std::map<std::string, ReportFrames> robots;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const std::string robot(table.text(row, robot_column));
-    if (several && robot.empty()) continue;  // could not be read: nobody's
+    if (several && robot.empty()) continue;  // could not be read: belongs to no robot
     ReportFrames& frames = robots[robot];
     frames.robot = robot;
     frames.rows.push_back(row);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The parts of a report, each from what was read of the result folder; empty where there is nothing to tell.
+// The parts of a report, each made from the data of the result folder; empty if there is nothing to show.
 #include <string>
 
 #include "plumbline/report/report.hpp"
@@ -14,8 +14,8 @@ namespace plumbline::report {
 std::string head_html(const ReportData& data);
 /// The folder's snapshots; where it has none, drawn now. `scratch`: where a picture may be put meanwhile.
 core::Result<std::string> pictures_html(ReportData& data, const std::filesystem::path& scratch);
-/// The map to turn and walk through; empty without a cloud. When it cannot be shown, that is told in `data`.
-/// Errors (kInput): request.other cannot be read.
+/// The map to turn and walk through; empty without a cloud. If it cannot be shown, `data` says so. Errors
+/// (kInput): request.other cannot be read.
 core::Result<std::string> viewer_html(ReportData& data, const ReportRequest& request,
                                       const core::Executor& executor, core::Log& log);
 /// The paths from above, over the plan of the cloud.

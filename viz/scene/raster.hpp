@@ -16,7 +16,7 @@ namespace plumbline::viz {
 class Raster {
  public:
   Raster(int width, int rows);
-  /// Begins anew with the rows from `first_row` on.
+  /// Starts again with the rows from `first_row` on.
   void clear(int first_row, const Rgb& background);
 
   /// A disc that faces the viewer.

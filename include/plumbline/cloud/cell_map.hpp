@@ -39,8 +39,8 @@ int facing(const Normal& normal) {
   return static_cast<int>(2 * axis + (normal[axis] < 0 ? 1 : 0));
 }
 
-/// Spreads cells over a table (finaliser of MurmurHash3, public domain), eight that follow one another
-/// together: who asks for a cell asks for its neighbours too.
+/// Spreads cells over a table (finaliser of MurmurHash3, public domain), eight consecutive ones together:
+/// neighbouring cells are usually looked up together.
 struct CellHash {
   std::size_t operator()(std::uint64_t key) const {
     std::uint64_t eight = key >> 3U;

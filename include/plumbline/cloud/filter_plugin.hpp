@@ -31,8 +31,8 @@ constexpr std::uint32_t kFilterPluginMagic = 0x464c4250;
 /// The one symbol of a plugin, an extern "C" function: const FilterPlugin* plumbline_filter_plugin().
 constexpr const char* kFilterPluginSymbol = "plumbline_filter_plugin";
 
-/// Description of a plugin. The first three members never change, so that any program can tell why it does
-/// not fit any plugin.
+/// Description of a plugin. The first three members never change, so that any program can report why a plugin
+/// does not fit.
 struct FilterPlugin {
   std::uint32_t magic = kFilterPluginMagic;
   std::uint32_t interface = kFilterInterface;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The floor of a map, which tells which way is up.
+// The floor of a map, which shows which way is up.
 #include <Eigen/Core>
 #include <optional>
 

@@ -39,8 +39,8 @@ bool is_depth_view(const Cloud& camera_cloud, const sensor::Pinhole& camera);
 /// Evidence of one view about a point.
 enum class Evidence { kNone, kSurface, kFree, kHidden };
 
-/// The nearest and the furthest depth around each cell of a raster, which must outlive it: what a view says
-/// of many places is asked of these.
+/// The nearest and the furthest depth around each cell of a raster, which must outlive this; for testing many
+/// points against a view.
 class DepthLimits {
  public:
   explicit DepthLimits(const DepthRaster& raster);

@@ -16,9 +16,9 @@
 
 namespace plumbline::cloud {
 
-/// Keeps points a share of whose nearest neighbours (pcl::search::KdTree, over the points with normals) have
-/// a normal within an angle of theirs. `PointT` has unit normals; points without one (NaN) never agree.
-/// Neighbours are looked for among all points, indices given or not.
+/// Keeps a point if enough of its nearest neighbours (pcl::search::KdTree, over the points with normals) have
+/// a normal within an angle of its own. `PointT` has unit normals; points without one (NaN) never agree.
+/// Neighbours are searched among all points, with or without indices.
 template <typename PointT>
 class NormalConsistency : public ChoosingFilter<PointT> {
  public:

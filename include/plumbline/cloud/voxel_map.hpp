@@ -95,8 +95,8 @@ class VoxelMap {
   void insert(const Cloud& camera_cloud, const geometry::Rigid3& world_from_cloud);
   /// The same for what measured() gave, as far as it lies in `region` (voxels, both ends included).
   void insert(const std::vector<VoxelSample>& view, const Eigen::AlignedBox3i& region);
-  /// Points that were fused before, and moved since, fused anew. A voxel was seen as often as its most seen
-  /// point. In the order of points().
+  /// Fuses points again that were fused before and have moved since. A voxel counts as many observations as
+  /// its most seen point. In the order of points().
   static std::vector<FusedPoint> merged(const std::vector<FusedPoint>& points,
                                         const VoxelMapOptions& options);
 
@@ -116,7 +116,7 @@ class VoxelMap {
   VoxelMapOptions options_;
   std::deque<VoxelSide> sides_;
   CellMap<std::uint32_t> places_;  ///< among the sides, by voxel, the lowest bit the side
-  std::pair<std::uint64_t, std::uint32_t> last_{0, 0};  ///< voxel and place that were asked for last
+  std::pair<std::uint64_t, std::uint32_t> last_{0, 0};  ///< voxel and index of the last look-up
   std::uint32_t view_ = 0;
 };
 

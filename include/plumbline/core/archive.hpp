@@ -196,7 +196,7 @@ class ByteReader : public Archive<ByteReader> {
   void check(bool holds, const char* otherwise) const {
     if (!holds) throw BadBytes(otherwise);
   }
-  /// Before memory is taken for so many bytes.
+  /// Checks that `size` bytes are left, before memory is allocated for them.
   void need(std::size_t size) const { check(size <= left_, "it ends too early"); }
   /// Everything that is left.
   void rest(Bytes& bytes) {

@@ -33,7 +33,7 @@ struct ConfigNode {
   [[nodiscard]] const ConfigNode* find(const std::string& key) const;
 };
 
-/// All problems of a file are collected and told together.
+/// One problem of a file; all are collected and reported together.
 struct ConfigProblem {
   ConfigMark mark;
   std::string path;  ///< dotted path of the key, e.g. "stages.track.points"
@@ -52,16 +52,17 @@ Error to_error(const ConfigProblems& problems);
 Result<ConfigNode> read_yaml(const std::filesystem::path& file);
 Result<ConfigNode> parse_yaml(const std::string& text, const std::string& file_name);
 
-/// The same, with the problems added to a list, so that those of a file's meaning can be told with them.
-/// Empty if nothing sensible can be read (no such file, broken syntax, a limit). Of a key given twice the
-/// first holds.
+/// The same, with the problems added to a list, so that they can be reported with those of the file's
+/// meaning. Empty if nothing useful can be read (no such file, broken syntax, a limit). If a key is given
+/// twice the first one counts.
 std::optional<ConfigNode> read_yaml(const std::filesystem::path& file, ConfigProblems& problems);
 std::optional<ConfigNode> parse_yaml(const std::string& text, const std::string& file_name,
                                      ConfigProblems& problems);
 
 /// Names of the YAML files of a folder, without their ending, sorted.
 std::vector<std::string> yaml_names(const std::filesystem::path& folder);
-/// A file, or one of `folder` by its name. Error (kUsage): neither; `what` it is, "camera", is told.
+/// Path of a file, or of the one in `folder` with that name. Error (kUsage): neither exists; `what` is its
+/// kind for the message, such as "camera".
 Result<std::filesystem::path> find_yaml(const char* what, const std::string& name_or_file,
                                         const std::filesystem::path& folder);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// FNV-1a, 64 bits: tells contents apart; no protection against intent.
+// FNV-1a, 64 bits: distinguishes contents; no protection against intent.
 #include <cstddef>
 #include <cstdint>
 

@@ -38,8 +38,8 @@ struct PartEntry {
   const void* functions = nullptr;
 };
 
-/// Loads plumbline_<name>.so from one of the folders in which the program's own libraries are looked for (its
-/// RUNPATH); it stays loaded. Errors (kInternal) name the file, what is wrong and the remedy. Thread-safe.
+/// Loads plumbline_<name>.so from one of the folders of the program's own libraries (its RUNPATH); it stays
+/// loaded. Errors (kInternal) name the file, what is wrong and the remedy. Thread-safe.
 Result<const void*> load_part(const std::string& name, std::uint64_t layout);
 
 /// The functions of a part, loaded by the first call; later calls cost nothing. Thread-safe.

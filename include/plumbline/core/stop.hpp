@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Asks a run to end in order (Ctrl-C). Cheap to copy and to ask.
+// Request to end a run in order (Ctrl-C). Cheap to copy and to query.
 #include <atomic>
 #include <memory>
 

@@ -14,7 +14,7 @@ namespace plumbline::dataset {
 
 struct ConvertOptions {
   bool replace = false;        ///< an earlier copy
-  std::function<bool()> stop;  ///< asked before each frame: true ends the copy there; may be empty
+  std::function<bool()> stop;  ///< called before each frame: true ends the copy there; may be empty
   std::function<void(std::size_t)> progress;  ///< frames written so far; may be empty
 };
 

@@ -91,7 +91,7 @@ class FrameSource {
   [[nodiscard]] virtual bool is_last(std::size_t index, const core::StopToken& /*stop*/) const {
     return index + 1 == size();
   }
-  /// For a live source: true if nobody wants a result any more.
+  /// For a live source: true if the result is not needed any more.
   [[nodiscard]] virtual bool given_up() const { return false; }
   /// For a live source: ends it and what it writes itself. Error (kOutput): the record.
   [[nodiscard]] virtual core::Result<void> finish() const { return {}; }

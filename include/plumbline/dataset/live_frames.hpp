@@ -46,12 +46,12 @@ class LiveFrames {
   core::Result<void> push(const LiveFrame& frame);
   /// No more frames will come.
   void close();
-  /// Nobody wants a result any more: the run ends with an error as soon as it can.
+  /// Abandons the run, because its result is not needed: it ends with an error as soon as it can.
   void abandon();
 
-  /// Number of frames that have arrived and that nobody has begun to read.
+  /// Number of frames that have arrived and are not being read yet.
   [[nodiscard]] std::size_t waiting() const;
-  /// Waits until fewer than `most` frames wait, so many seconds at most; false when they did not suffice.
+  /// Waits until fewer than `most` frames wait, at most this long; false on timeout.
   [[nodiscard]] bool wait_for_room(std::size_t most, double seconds) const;
   /// Sets the folder for kept frames; it needs room. Without a folder they stay in memory.
   void keep_in(const std::filesystem::path& folder);

@@ -25,13 +25,14 @@ struct StreamMessage {
   std::vector<std::uint8_t> bytes;  ///< CDR with the four bytes in front that name its kind
 };
 
-/// Messages that somebody publishes. Used by one thread at a time.
+/// Published messages. Used by one thread at a time.
 class MessageStream {
  public:
   virtual ~MessageStream() = default;
   /// All that is published and seen so far, by name.
   virtual std::vector<StreamTopic> topics() = 0;
-  /// From now on next() gives messages of it. Error (kInput): nobody publishes it in a known type.
+  /// Makes next() return messages of the topic from now on. Error (kInput): it is not published in a known
+  /// type.
   virtual core::Result<void> subscribe(const std::string& topic) = 0;
   virtual void unsubscribe(const std::string& topic) = 0;
   /// The next message, of whichever topic; none when none comes in time.

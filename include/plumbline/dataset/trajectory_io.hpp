@@ -21,10 +21,10 @@ struct TrajectoryReading {
   std::vector<std::string> notes;  ///< what a reader of the numbers should know, one sentence each
 };
 
-/// Reads a trajectory of any format, recognised by its rows and its header; a header that names columns tells
-/// their order. Rows with a value that is not finite are left out and counted in the notes; so are poses that
-/// share a stamp, which are kept in the file's order. Errors (kInput) name file and line: missing columns,
-/// not a number, decimal commas, zero quaternion, no rotation; no finite row at all.
+/// Reads a trajectory of any format, recognised by its rows and its header; a header with column names gives
+/// their order. Rows with a value that is not finite are left out and counted in the notes; poses that share
+/// a stamp are counted too, and kept in the file's order. Errors (kInput) name file and line: missing
+/// columns, not a number, decimal commas, zero quaternion, not a rotation; no finite row at all.
 core::Result<TrajectoryReading> read_trajectory_file(const std::filesystem::path& file);
 
 /// The poses alone, of a file that has stamps (without: kInput). `notes`, if given, gets those of the

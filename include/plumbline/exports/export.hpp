@@ -33,12 +33,12 @@ struct ExportRequest {
   std::filesystem::path input;        ///< result folder, map.db, OUT of an interrupted run, or a cloud
   std::filesystem::path output;       ///< a file, or a folder for the forms that are one
   std::string format;                 ///< name of a Format; empty: by the ending of `output`
-  Content content = Content::kCloud;  ///< tells forms of one ending apart
+  Content content = Content::kCloud;  ///< distinguishes formats with the same ending
   std::string robot;                  ///< whose map, of an interrupted run of several; empty: the only one
   /// Recordings for the pictures, in the order of the robots; empty: those that the map was made from.
   std::vector<std::string> recordings;
   OpenRecording open;  ///< null: there are no pictures
-  /// Runs work during which libraries print what nobody wants to read (Poisson's); null: just runs it.
+  /// Runs work while suppressing output of libraries (Poisson's); null: just runs it.
   std::function<void(const std::function<void()>&)> quietly = nullptr;
   ExportOptions options;
   bool replace = false;         ///< an earlier export's folder may be replaced
@@ -66,7 +66,7 @@ core::Result<void> check_export(const ExportRequest& request);
 struct FormatInfo {
   std::string name;                  ///< name for --format
   std::string endings;               ///< ".yaml .pgm", or "folder"
-  std::string content;               ///< "cloud", "mesh", ...: what tells forms of one ending apart
+  std::string content;               ///< "cloud", "mesh", ...: distinguishes formats with the same ending
   std::string needs;                 ///< "cloud", "map.db", "map.db, recording"
   std::string title;                 ///< one line
   std::string description;           ///< Markdown: what is right about it and what to do with it

@@ -37,8 +37,8 @@ struct ExportOptions {
   double cut_m = 1.2;           ///< height over the floor
   std::vector<double> section;  ///< x y x y: a vertical cut along this line instead; empty: a plan
   // Paths.
-  std::vector<double>
-      body;  ///< pose x y z qx qy qz qw of the camera in the body; empty: the camera's own path
+  /// Pose x y z qx qy qz qw of the camera in the body; empty: the camera's own path.
+  std::vector<double> body;
 
   /// `table` refers to this object.
   void declare(core::OptionTable& table);

@@ -25,7 +25,7 @@ core::Result<MapView> view_of(const ExportRequest& request, const core::Executor
                               const ExportProgress& progress);
 
 /// The same with the cloud of a second map over it, moved into the first one's frame by cameras of the same
-/// stamp; both tell the distance to the other one. Errors (kInput) of either.
+/// stamp; each has its distance to the other one as a layer. Errors (kInput) of either.
 core::Result<MapView> view_of_two(const ExportRequest& first, const ExportRequest& second,
                                   const core::Executor& executor, core::Log& log,
                                   const ExportProgress& progress);

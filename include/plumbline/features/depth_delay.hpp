@@ -7,9 +7,10 @@
 
 namespace plumbline::features {
 
-/// Reads the depth of points anew where the depth camera, `depth_from_camera` beside the colour camera, saw
-/// them, and carries it back: as if both images had been taken at once. `depth` (CV_32FC1, metres) is an
-/// image of `camera`. Points without depth stay without; one that loses it there has none afterwards.
+/// Reads the depth of points again at the position where the depth camera, `depth_from_camera` from the
+/// colour camera, saw them, and moves it back: as if both images had been taken at once. `depth` (CV_32FC1,
+/// metres) is an image of `camera`. Points without depth stay without; a point without depth at the new
+/// position loses it.
 void undo_point_depth_delay(FrameFeatures& features, const cv::Mat& depth, const sensor::Pinhole& camera,
                             const geometry::Rigid3& depth_from_camera);
 /// The same for lines; dearer, and only keyframes need it.

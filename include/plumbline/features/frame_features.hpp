@@ -52,7 +52,7 @@ struct FrameFeatures {
   cv::Mat thumbnail;        ///< CV_32FC1, kThumbnailWidth wide, blurred grey values
   cv::Mat thumbnail_depth;  ///< CV_32FC1 of the same size, metres, 0 = none
 
-  /// Points or lines were looked for.
+  /// True if points or lines were extracted.
   [[nodiscard]] bool extracted() const { return grid.made(); }
 
   /// Depth of point `i`'s surface `shift` pixels beside it, metres; 0 where there is none.
@@ -63,8 +63,8 @@ struct FrameFeatures {
     return scale > 0.0F ? depth / scale : 0.0F;
   }
 
-  /// Point `i` stands for what lies `shift` (pixels) beside where it was found. Its patch stays what it is
-  /// and knows how far beside. `grid` is as before: make it anew once all points have moved.
+  /// Moves point `i` by `shift` (pixels). Its patch is not changed and keeps the offset. `grid` is not
+  /// updated: make it again once all points have moved.
   void move_point(std::size_t i, const Eigen::Vector2f& shift) {
     points[i].depth = depth_beside(i, shift);
     points[i].pixel += shift;

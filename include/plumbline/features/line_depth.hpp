@@ -38,7 +38,7 @@ double endpoint_sigma(const Eigen::Vector3d& end, const EndpointNoise& noise);
 
 struct LineDepthOptions {
   int samples = 40;  ///< places along the segment, at most
-  int side_px = 4;   ///< depth is looked for this far beside the segment
+  int side_px = 4;   ///< distance beside the segment within which depth is searched
   double max_depth_m = 8.0;
   double inlier_sigmas = 3.0;  ///< gate in units of the depth noise
   double min_inlier_share = 0.6;

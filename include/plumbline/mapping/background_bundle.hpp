@@ -24,8 +24,8 @@ struct BundleReport {
   double solve_ms = 0.0;                 ///< wall time of the adjustment
 };
 
-/// One bundle is under way at a time. Of the keyframes that ask meanwhile, the newest gets the next one,
-/// taken as soon as the one under way is put back: its surroundings hold the others.
+/// Runs one bundle at a time in the background. If keyframes request one meanwhile, the newest gets the next
+/// one, which is taken as soon as the present one is put back: its surroundings include the others.
 class BackgroundBundle {
  public:
   /// `lag`: frames between taking and putting back; 0: adjusted on the spot. Executor and log must outlive
@@ -38,10 +38,10 @@ class BackgroundBundle {
   void request(const maps::Map& map, core::KeyframeId keyframe, std::int64_t frame);
   /// True if the bundle is to be put back at this frame.
   [[nodiscard]] bool due(std::int64_t frame) const { return running_ != nullptr && frame >= running_->due; }
-  /// Waits for the bundle under way, puts it back, begins the next one if one was asked for. What moved;
-  /// nothing when the bundle was of no use.
+  /// Waits for the bundle under way, puts it back, and starts the next one if requested. Returns what moved;
+  /// nothing if the bundle was not used.
   std::optional<MapCorrection> commit(maps::Map& map, std::int64_t frame, BundleReport& report);
-  /// No bundle is under way or asked for.
+  /// True if no bundle is under way or requested.
   [[nodiscard]] bool idle() const { return running_ == nullptr && waiting_.empty(); }
   /// Bundles that would have torn the map, and were not put into it.
   [[nodiscard]] int refused() const { return refused_; }

@@ -57,7 +57,7 @@ struct CameraCalibration {
 };
 
 /// `given`: the camera that the runs' features were read with. The same for any number of threads. Errors
-/// (kInput): the runs hold too few keyframes or points seen together to tell anything.
+/// (kInput): the runs have too few keyframes, or too few points seen by several.
 core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRun>& runs,
                                                  const sensor::Camera& given,
                                                  const CalibrationOptions& options,

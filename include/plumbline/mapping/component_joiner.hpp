@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Finds out how two components of one robot's map lie to each other (docs/method/components.md): keyframes of
-// the one are held against those of the other, by the same verification and the same decision that maps of
-// two robots are merged by.
+// Finds the relative pose of two components of one robot's map (docs/method/components.md): keyframes of one
+// are compared with those of the other, with the same verification and decision as for maps of two robots.
 #include <cstdint>
 #include <map>
 #include <optional>

@@ -28,7 +28,7 @@ struct ConsistencyOptions {
   double max_turned_rad = 0.06;    ///< ... and turn it
   double apart_per_metre = 0.02;   ///< more for every metre between them: the maps themselves drift
   double turned_per_metre = 0.01;  ///< rad
-  std::size_t max_sets = 5;        ///< that are looked for
+  std::size_t max_sets = 5;        ///< largest number of sets to find
   int budget = 200000;             ///< steps of the search for each set; then the best so far is taken
 };
 

@@ -2,9 +2,8 @@
 #pragma once
 
 // The whole map in one optimisation: all keyframes, points and lines, the surface edges of the map, and edges
-// from elsewhere (aligned local maps, closed loops, overlaps of robots). First a pose graph, which takes out
-// drift and tells wrong edges; then bundle adjustment with the edges that are left
-// (docs/method/refinement.md).
+// from elsewhere (aligned local maps, closed loops, overlaps of robots). First a pose graph, which removes
+// drift and rejects wrong edges; then bundle adjustment with the remaining edges (docs/method/refinement.md).
 #include <cmath>
 #include <cstdint>
 #include <map>
@@ -67,9 +66,9 @@ KeyframePoses solve_trusted_graph(const maps::Map& map, const std::vector<PoseEd
 /// Gives keyframes new poses; points and lines follow the keyframes that see them (mean over these).
 void move_keyframes(maps::Map& map, const KeyframePoses& poses);
 
-/// By how much the standard deviations of one kind of observation are taken larger for covariances: residuals
-/// of neighbours are alike, and so many of them say less than as many independent ones would
-/// (docs/method/refinement.md tells where the numbers come from).
+/// Factors on the standard deviations of each kind of observation for covariances: residuals of neighbours
+/// are correlated, so many of them weigh less than as many independent ones (docs/method/refinement.md
+/// explains the numbers).
 struct SigmaFactors {
   double points = 1.0;
   double lines = 1.0;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// One thing in the world, one landmark: landmarks are looked for in the images of keyframes that should see
-// them and did not (docs/method/mapping.md).
+// Makes one landmark of one thing in the world: landmarks are searched in the images of keyframes that should
+// see them and did not (docs/method/mapping.md).
 #include <cstdint>
 #include <map>
 #include <vector>

@@ -33,13 +33,13 @@ struct NewestImage {
   features::FrameFeatures& newest;     ///< its features, those that the map holds
 };
 
-/// Corners of `keyframe` that see no landmark and have no depth (0, or beyond `max_measured_m`), against
-/// those of `neighbours`, best first: near the epipolar line, alike in descriptor, orientation and scale,
-/// clearly better than the second best; kept when both rays meet within the pixel noise, in front of both
-/// cameras, at a known depth. Corners are found to a pixel, which needs a long way to tell depth: with
-/// `image` the newest corner is aligned with the older one's patch and then says it after a third of that;
-/// it moves to where it was found, and both see their landmark exactly. Those whose images do not agree
-/// are taken as they are. Returns the new landmarks, which both keyframes observe.
+/// Triangulates corners of `keyframe` that see no landmark and have no depth (0, or beyond `max_measured_m`)
+/// with those of `neighbours`, best first: near the epipolar line, alike in descriptor, orientation and
+/// scale, clearly better than the second best; kept if both rays meet within the pixel noise, in front of
+/// both cameras, at a known depth. Corners are found to a pixel, which needs a long baseline to determine
+/// depth: with `image` the newest corner is aligned with the older one's patch and needs only a third of it;
+/// it moves to the aligned position, and both see their landmark exactly. Corners whose images do not agree
+/// are used as they are. Returns the new landmarks, which both keyframes observe.
 std::vector<core::PointId> triangulate_points(maps::Map& map, core::KeyframeId keyframe,
                                               const std::vector<core::KeyframeId>& neighbours,
                                               double max_measured_m, const sensor::Pinhole& camera,

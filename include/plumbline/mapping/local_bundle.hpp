@@ -38,11 +38,11 @@ LocalBundle take_local_bundle(const maps::Map& map, core::KeyframeId keyframe, c
 /// new_from_old_world around keyframes that moved.
 using MapCorrection = std::map<core::KeyframeId, geometry::Rigid3>;
 
-/// Poses, landmarks and outliers back into the map. What is gone from the map by now is left out. Keyframes
-/// made after the take keep their pose relative to their parent in the spanning tree; landmarks that were not
-/// part of the bundle move with the keyframe that saw them first. Nothing is done when a keyframe's pose is
-/// not the one that was taken: somebody else has moved the map, and knew more.
-/// Nor when it contradicts what the tracker measured (tracked_path.hpp), which is reported then.
+/// Puts poses, landmarks and outliers back into the map. What has left the map by now is skipped. Keyframes
+/// made after the bundle was taken keep their pose relative to their parent in the spanning tree; landmarks
+/// that were not part of the bundle move with the keyframe that saw them first. Nothing is changed if a
+/// keyframe's pose is not the one that was taken, because the map was moved with better knowledge meanwhile,
+/// or if the result contradicts what the tracker measured (tracked_path.hpp), which is then reported.
 std::optional<MapCorrection> put_back(const LocalBundle& bundle, maps::Map& map,
                                       std::optional<Contradiction>* refused = nullptr);
 

@@ -57,8 +57,7 @@ class LocalMapper {
 
   /// Adds a keyframe: observations of the landmarks it tracked, new landmarks from its depth, where older
   /// keyframes saw these, and landmarks without depth, triangulated. `levels`: the pyramid of its image;
-  /// empty: none.
-  /// `begins_component`: it hangs on no other keyframe (maps/components.hpp).
+  /// empty: none. `begins_component`: it gets no parent (maps/components.hpp).
   core::KeyframeId insert(maps::Map& map, const sensor::RgbdFrame& frame, const tracking::TrackResult& track,
                           const std::vector<cv::Mat>& levels, bool begins_component = false);
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Closes loops (docs/method/places.md): every keyframe asks whether its place was seen before; what is
-// verified, several times in a row and consistently, becomes an edge of a robust pose graph; what that does
-// not take for wrong moves the map, doubles are merged, and everything is adjusted together.
+// Closes loops (docs/method/places.md): every keyframe is compared with earlier places; verified matches that
+// are consistent several times in a row become edges of a robust pose graph; edges that it does not reject
+// move the map, duplicate landmarks are merged, and everything is adjusted together.
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -34,14 +34,14 @@ struct LoopOptions {
   /// Largest correction by a loop, as a share of the distance travelled since the match: what looks alike
   /// further off (doors of a corridor) is another place.
   double max_drift = 0.02;
-  bool robust = true;  ///< the pose graph may take loops for wrong
+  bool robust = true;  ///< the pose graph may reject loops
   bool bundle = true;  ///< adjust the whole map after a loop
   std::uint64_t seed = 1;
   places::VocabularyOptions vocabulary;
   places::RecogniserOptions places;
   VerificationOptions verify;
   FusionOptions fusion;
-  LoopOptions() { verify.rounds = 200; }  ///< enough where a third agrees; asked at every keyframe
+  LoopOptions() { verify.rounds = 200; }  ///< enough if a third agrees; done for every keyframe
   void declare(core::OptionTable& table);
 };
 
@@ -49,7 +49,7 @@ struct LoopCounts {
   int candidates = 0;  ///< places that looked like one seen before and were verified
   int verified = 0;    ///< with success
   int accepted = 0;    ///< loops that moved the map
-  int rejected = 0;    ///< edges that the pose graph took for wrong
+  int rejected = 0;    ///< edges that the pose graph rejected
   int refused = 0;     ///< closings that would have torn the map
   int located = 0;     ///< frames of a lost tracker that another robot's map knew
   int by_others = 0;   ///< loops by way of another robot's map that moved this one
@@ -84,7 +84,7 @@ struct LoopDispute {
 /// Verified loops that wait for others to agree with them.
 class PendingLoops {
  public:
-  /// A verified loop waits for another one for so many keyframes.
+  /// `patience`: number of keyframes for which a verified loop waits for another one.
   explicit PendingLoops(int patience = 6) : patience_(patience) {}
   /// Adds those of `keyframe`, which is new in the queries' map. The largest consistent set of the loops
   /// found lately, with `keyframe` in it, when it holds enough keyframes and no other set comes near; then

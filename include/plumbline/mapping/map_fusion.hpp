@@ -44,7 +44,7 @@ struct MapFusionOptions {
   double max_seen_through = 0.06;  ///< share of landmarks seen through above which such an answer is refuted
   double min_confirmed = 0.5;    ///< share of the keyframes with a view of the other map that must confirm it
   int verifications = 250;       ///< pairs of keyframes that are verified for each two maps, at most
-  bool robust = true;            ///< the pose graph may take pairs for wrong
+  bool robust = true;            ///< the pose graph may reject pairs
   bool merge_duplicates = true;  ///< merge duplicate landmarks; a preview does not
   std::uint64_t seed = 1;
   places::VocabularyOptions vocabulary;
@@ -81,7 +81,7 @@ struct OverlayFit {
   [[nodiscard]] double share() const {
     return expected > 0 ? std::max(0.0, matched - chance) / expected : 0.0;
   }
-  /// Share of all that can be told.
+  /// Share of landmarks seen through, of those that can be judged.
   [[nodiscard]] double seen_through() const {
     const int told = expected + contradicted;
     return told > 0 ? static_cast<double>(contradicted) / told : 0.0;
@@ -186,9 +186,9 @@ class OverlapFinder {
 VerifiedPair verify_candidate(const std::vector<MapPart>& parts, const OverlapFinder::Candidate& candidate,
                               const MapFusionOptions& options);
 
-/// Do these pairs, all between parts a and b, show that the maps overlap, and how do they lie? Fills all but
-/// candidates, tried and refused_pairs. When too few agree, keyframes near them are asked first; when enough
-/// do, more views that should show both maps.
+/// Decides whether these pairs, all between parts a and b, show that the maps overlap, and finds their
+/// relative pose. Fills all but candidates, tried and refused_pairs. If too few agree, keyframes near them
+/// are tested first; if enough agree, more views that should show both maps.
 MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, std::size_t b,
                              const std::vector<VerifiedPair>& found, const MapFusionOptions& options,
                              const core::Executor& executor);
@@ -220,10 +220,10 @@ struct FusedMap {
   std::string refusal;  ///< location of that tear
 };
 
-/// Lays all parts that hang together with `anchor` into its world by a pose graph and merges what is there
-/// twice. Poses and landmarks are not adjusted together here: that is done when surfaces are aligned too
-/// (stage refine). Merges that the pose graph finds to contradict the rest are no longer accepted, and then
-/// the fusion is done without them.
+/// Moves all parts that are connected with `anchor` into its world by a pose graph and merges duplicates.
+/// Poses and landmarks are not adjusted together here: that is done when surfaces are aligned too (stage
+/// refine). Merges that contradict the rest in the pose graph are no longer accepted, and the fusion is then
+/// done without them.
 FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>& merges, std::size_t anchor,
                    const MapFusionOptions& options);
 

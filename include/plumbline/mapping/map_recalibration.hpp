@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A map whose camera turned out to be another one than its keyframes were read with is made anew: features
-// follow from their measurements, and only surfaces are looked up in the keyframes' pictures again
-// (docs/method/calibration.md).
+// Rebuilds a map for another camera than the one its keyframes were read with: features follow from their
+// measurements, and only surfaces are read in the keyframes' pictures again (docs/method/calibration.md).
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -42,8 +41,8 @@ void measure_surfaces_again(const sensor::Pinhole& camera, const std::vector<map
                             const PictureReader& read, const SurfaceMeasurement& how,
                             const core::Executor& executor, maps::Map& map);
 
-/// Landmarks are looked for in all keyframes that should see them, for a wrong camera made the tracker reject
-/// some; then the whole map is adjusted.
+/// Landmarks are searched in all keyframes that should see them, because a wrong camera made the tracker
+/// reject some; then the whole map is adjusted.
 GlobalAdjustmentSummary adjust_recalibrated_map(const sensor::Pinhole& camera, const FusionOptions& fusion,
                                                 const GlobalAdjustmentOptions& adjustment, maps::Map& map);
 

@@ -33,7 +33,7 @@ struct MeetingEvent {
   std::int64_t frame = 0;                   ///< of the log, that brought the keyframe
   core::KeyframeId keyframe;                ///< that made it happen
   MergeEvidence evidence;                   ///< of kMet and kTakenBack
-  std::shared_ptr<const FusedMap> preview;  ///< of kMet: all maps that hang together now; parts: robots
+  std::shared_ptr<const FusedMap> preview;  ///< of kMet: all maps that are connected now; parts: robots
 };
 
 /// Pose of a robot in the frame that it shares with others.
@@ -63,7 +63,7 @@ class MergeServer {
   /// All that is left, when the log has ended.
   std::vector<MeetingEvent> finish();
 
-  /// Pose of the robot as of the last commit; none if it has met nobody.
+  /// Pose of the robot as of the last commit; none if it has met no other robot.
   [[nodiscard]] std::optional<RobotPlace> place(std::size_t robot) const;
 
  private:
@@ -86,7 +86,7 @@ class MergeServer {
   };
   /// Data of the background work while it runs.
   struct Work {
-    std::vector<std::shared_ptr<const maps::Map>> maps;  ///< by robot, as told last
+    std::vector<std::shared_ptr<const maps::Map>> maps;  ///< by robot, newest version
     std::vector<MapPart> parts;                          ///< the same
     OverlapFinder finder;
     std::map<std::pair<std::size_t, std::size_t>, RobotPair> pairs;

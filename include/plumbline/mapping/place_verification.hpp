@@ -17,8 +17,8 @@ namespace plumbline::mapping {
 
 struct VerificationOptions {
   int min_inliers = 30;  ///< points, and lines counted twice
-  double min_found =
-      0.15;  ///< smallest share of the landmarks in view that are found at their predicted positions
+  /// Smallest share of the landmarks in view that are found at their predicted positions.
+  double min_found = 0.15;
   double min_evidence = 10.0;  ///< smallest product of inliers and that share: few inliers need a large share
   int min_cells = 5;           ///< smallest number of cells with inliers, of a 4 x 4 grid
   double min_overlap = 0.5;    ///< smallest share of the surface in view that is confirmed

@@ -72,19 +72,19 @@ class Slam {
  public:
   Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32_t robot,
        const core::Executor& executor, core::Log& log);
-  Slam(const Slam&) = delete;  // the tracker asks this one for places
+  Slam(const Slam&) = delete;  // the tracker calls this object to check places
   Slam& operator=(const Slam&) = delete;
 
-  /// Goes on where another Slam stopped when it had just made a keyframe: with its map and frame_poses(). To
-  /// be called before the first frame. What ran beside the tracker is begun again; landmarks are watched, and
-  /// places known, as the map tells. A map without keyframes is no place to go on from: nothing happens.
+  /// Continues where another Slam stopped when it had just made a keyframe, with its map and frame_poses().
+  /// To be called before the first frame. Background work is started again; landmarks on probation and places
+  /// follow from the map. With a map without keyframes nothing happens.
   void restore(maps::Map map, std::vector<maps::FramePose> frames);
 
   /// The camera that took the pictures, of which rectified images are made: its shutter, and what is measured
   /// in them. To be called before the first frame; without it they are those of the pinhole.
   void set_camera(const sensor::Camera& camera);
-  /// It turns out to be another one. The map is made anew for it and adjusted (recalibrate_map), and frames
-  /// that come from now on have been read as that camera's. `read`: pictures of keyframes again; may be
+  /// Replaces the camera by a refined one. The map is rebuilt for it and adjusted (recalibrate_map), and
+  /// later frames must have been read with that camera. `read`: reads pictures of keyframes again; may be
   /// empty.
   void recalibrate(const sensor::Camera& camera, const PictureReader& read);
   [[nodiscard]] const sensor::Camera& camera() const { return camera_; }

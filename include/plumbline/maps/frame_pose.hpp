@@ -59,9 +59,9 @@ struct PathCheck {
   std::vector<PathStep> tears;  ///< beyond noise: 5 cm or 3 degrees, and 4 standard deviations
 };
 
-/// Checks whether the map has torn: the path must lead from frame to frame as the tracker saw it. Frames hang
-/// on keyframes, so that steps change only where the keyframe does, and a correction that is spread over the
-/// way changes each by little. The frames of each robot are in order.
+/// Checks whether the map has torn: the path must lead from frame to frame as the tracker saw it. Frames are
+/// relative to keyframes, so that steps change only where the keyframe changes, and a correction that is
+/// spread over the path changes each by little. The frames of each robot are in order.
 PathCheck check_path(const std::vector<FramePose>& frames, const Map& map);
 
 /// True if a step that the tracker knows to `sigma_m` cannot be off by this much.

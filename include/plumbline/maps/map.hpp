@@ -115,7 +115,7 @@ struct NextIds {
   std::uint64_t edge = 0;
 };
 
-/// Revision of a map, to ask later what changed since. The default: before anything was there.
+/// Revision of a map, to find out later what has changed since. The default is before anything was added.
 struct MapRevision {
   std::uint64_t points = 0;
   std::uint64_t lines = 0;
@@ -173,8 +173,8 @@ class Map {
   // Keyframes. camera_from_world of each is an estimate that set_pose replaces.
   KeyframeId add_keyframe(std::shared_ptr<const Keyframe> keyframe,
                           const geometry::Rigid3& camera_from_world);
-  /// Puts a keyframe that was made anew, of the same measurements, in the place of the one with its id: as
-  /// many features, in the same order (else std::invalid_argument).
+  /// Replaces the keyframe with the same id by one that was recomputed from the same measurements: as many
+  /// features, in the same order (else std::invalid_argument).
   void replace_keyframe(std::shared_ptr<const Keyframe> keyframe);
   [[nodiscard]] KeyframeId next_keyframe_id(std::int32_t robot) const;
   [[nodiscard]] bool has_keyframe(KeyframeId id) const { return keyframes_.contains(id); }
@@ -186,11 +186,10 @@ class Map {
   [[nodiscard]] std::vector<KeyframeId> keyframe_ids() const { return keyframes_.ids(); }
   [[nodiscard]] std::size_t keyframe_count() const { return keyframes_.size(); }
 
-  // Spanning tree: every keyframe but a root hangs on one that shared much with it when it was made.
-  /// Hangs a new keyframe on the one that shares most with it; if none does, on the robot's last one before
-  /// it.
+  // Spanning tree: the parent of every keyframe but a root shared much with it when it was made. Attaches a
+  // new keyframe to the one that shares most with it; if none does, to the robot's previous one.
   void attach(KeyframeId id);
-  void detach(KeyframeId child);                         ///< it hangs on nothing: a component's root
+  void detach(KeyframeId child);                         ///< makes it the root of a component
   void set_parent(KeyframeId child, KeyframeId parent);  ///< std::invalid_argument: would be a cycle
   [[nodiscard]] KeyframeId parent(KeyframeId id) const {
     return keyframes_.at(id).parent;

@@ -29,7 +29,7 @@ struct ResultFolder {
 /// Errors (kInput): no such folder, or not a result.
 core::Result<ResultFolder> open_result(const std::filesystem::path& folder);
 
-/// map.ply, or map.pcd where the pipeline was told to write no PLY.
+/// map.ply, or map.pcd if the pipeline wrote no PLY.
 core::Result<cloud::CloudFile> read_result_cloud(const ResultFolder& result);
 
 /// Segments of lines.ply.

@@ -107,8 +107,8 @@ struct StoreStep {
   std::vector<FramePose> frames;          ///< that came since
   std::vector<std::string> log;           ///< lines that came since
   std::vector<StoreCloud> clouds;
-  /// All robots, when the camera of one became another: keyframes and edges of `map`, which is whole then,
-  /// were made anew. Null: no camera changed.
+  /// All robots, if the camera of one was replaced: keyframes and edges of `map`, which is whole in that
+  /// case, were recomputed. Null: no camera changed.
   std::shared_ptr<const std::vector<RobotInfo>> robots = nullptr;
 };
 
@@ -130,7 +130,7 @@ class StoreWriter {
   static core::Result<StoreWriter> resume(const std::filesystem::path& file);
   StoreWriter(StoreWriter&& other) noexcept;
   StoreWriter& operator=(StoreWriter&&) = delete;
-  /// Leaves one file, without a log beside it, unless somebody is reading it.
+  /// Leaves one file, without a log beside it, unless another program is reading it.
   ~StoreWriter();
 
   /// One transaction: brings the file up to `map` and `frames`, in which `keyframe` is new, and adds the
@@ -171,7 +171,7 @@ class StoreReader {
   [[nodiscard]] const StoreHeader& header() const;
   /// Asks the system to read the whole file from disk ahead.
   void read_ahead() const;
-  /// The map as it was committed: equal in every bit, order and id. The points' look-up grid is made anew for
+  /// The map as it was committed: equal in every bit, order and id. The points' look-up grid is rebuilt for
   /// images of the camera's size. `robot`: whose map, if those of several are not merged yet. Errors
   /// (kInput): damaged, or there are several maps and none of that name.
   [[nodiscard]] core::Result<StoredMap> load(const std::string& robot = {}) const;

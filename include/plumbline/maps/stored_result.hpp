@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A map in its store as results: clouds laid down anew, paths and lines, also of a run that was interrupted.
+// A map in its store as results: clouds fused again, paths and lines; also of an interrupted run.
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -47,10 +47,11 @@ class StoredResult {
   [[nodiscard]] geometry::Trajectory keyframe_trajectory() const { return maps::trajectory(keyframes()); }
   [[nodiscard]] std::vector<LineSegment3> lines() const;
 
-  /// Options with which the run fused its clouds, as far as its configuration tells; else the defaults.
+  /// Options with which the run fused its clouds, as far as its configuration contains them; else the
+  /// defaults.
   [[nodiscard]] cloud::DenseFusionOptions fusion_options() const;
-  /// The filters of its merged cloud, as far as its configuration tells. None where there is one of a plugin,
-  /// or one that writes a file.
+  /// The filters of its merged cloud, as far as its configuration contains them. None if one of them is a
+  /// plugin's, or writes a file.
   [[nodiscard]] cloud::FilterChain fusion_filters() const;
   /// The dense cloud: with the run's own options the one it wrote, filters and all. Errors (kInput): damaged,
   /// no clouds; those of filters.

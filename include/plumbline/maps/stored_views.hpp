@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Views that clouds are laid down from: poses of a map, and clouds that lie in a store.
+// Views from which clouds are fused: poses of a map, and clouds in a store.
 #include <cstdint>
 #include <filesystem>
 #include <functional>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A map in the browser while it grows: follows the stores of a run, which are read as anybody may read them,
-// so that the run waits for nothing.
+// A map in the browser while it grows: reads the stores of a run like any other reader, so that the run never
+// waits for it.
 #include <filesystem>
 #include <memory>
 #include <string>

@@ -26,7 +26,7 @@ struct PhotometricTerm {
 
 struct PhotometricFamily {
   std::vector<PhotometricTerm> terms;
-  cv::Mat image;           ///< CV_32FC1, of the camera whose pose is looked for
+  cv::Mat image;           ///< CV_32FC1, of the camera whose pose is estimated
   sensor::Pinhole camera;  ///< that takes `image`
   geometry::Rigid3 reference_from_world;
   double gain = 1.0;   ///< grey value expected in `image` = gain x that of the reference image

@@ -104,7 +104,7 @@ core::Result<cloud::CloudPtr> cloud_of(const KeyframeCloud& keyframe);
 /// The same for a store. Errors (kInput): it cannot be read.
 core::Result<maps::StoreCloud> store_cloud_of(const KeyframeCloud& keyframe);
 
-/// Voxels of the surfaces of keyframes that are kept with their clouds: as the stage refine wants them.
+/// Voxel size of the surfaces of keyframes that are kept with their clouds, for the stage refine.
 constexpr double kSurfaceVoxel_m = 0.03;
 
 /// The merged cloud in the output's frame, which output_from_map leads to: all results are written in it.

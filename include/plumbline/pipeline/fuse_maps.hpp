@@ -21,8 +21,9 @@ struct FuseRequest : RunRequest {
   std::string anchor;                       ///< robot or map whose frame all are laid into; empty: by content
 };
 
-/// The order of `maps` changes nothing; one alone is refined and laid down as it is. Errors as map_recording;
-/// when maps do not connect, those that do are in the result, and the summary's `reason` names the others.
+/// The result does not depend on the order of `maps`; a single one is refined and fused. Errors as
+/// map_recording; if maps do not connect, those that do are in the result, and the summary's `reason` names
+/// the others.
 core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core::Executor& executor,
                                           core::Log& log, const core::StopToken& stop,
                                           const Progress& progress);

@@ -34,7 +34,7 @@ struct MapRequest : RunRequest {
   /// Nothing is resumed. The run ends when they are closed.
   std::shared_ptr<dataset::LiveFrames> live;
   /// Called before the first frame with the folder that the run writes into, where map.db will be, and again
-  /// when the run begins anew with another camera: nothing of before is there then. May be empty.
+  /// if the run starts again with another camera: nothing earlier is there then. May be empty.
   std::function<void(const std::filesystem::path&)> prepared;
   /// Maps of other robots that the trackers use for relocalisation and loops: the result depends on what
   /// comes in there, and when; null: none do.

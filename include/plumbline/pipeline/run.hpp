@@ -23,7 +23,7 @@ struct RunRequest {
   std::filesystem::path pipelines_folder;  ///< shipped pipelines, with cameras/, filters/ and scenes/
   cloud::FilterRegistry filters = cloud::builtin_filters();  ///< with those of plugins
   bool replace = false;                                      ///< replace an earlier result
-  std::shared_ptr<RunObserver> observer;                     ///< who looks on; null: nobody
+  std::shared_ptr<RunObserver> observer;                     ///< observer of the run; null: none
   /// Called at the end of a run with the name of each stage whose end begins ("refine", "fuse, output"). May
   /// be empty.
   std::function<void(const std::string&)> finishing;
@@ -32,7 +32,7 @@ struct RunRequest {
 struct RunReport {
   std::size_t frames = 0;  ///< that went through the graph
   std::size_t frames_available = 0;
-  bool stopped = false;  ///< ended early because it was asked to
+  bool stopped = false;  ///< ended early on request
   /// First frame read to last change of the map: frames and the end of non-export stages.
   double map_s = 0.0;
   double export_s = 0.0;            ///< end of the stages that export

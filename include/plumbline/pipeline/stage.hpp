@@ -137,7 +137,7 @@ struct RunInput {
 struct RunStore {
   std::string configuration;  ///< the effective one, YAML; the same for any number of threads
   bool keeps_map = false;     ///< some stage keeps_map
-  bool keeps_clouds = false;  ///< and it gets the clouds that are to be laid down
+  bool keeps_clouds = false;  ///< and that stage gets the clouds to be fused
 };
 
 /// Hooks of callers that change a run or observe it.
@@ -146,7 +146,7 @@ struct RunHooks {
   std::shared_ptr<const mapping::OtherMapsInbox> feedback;  ///< MapRequest::feedback
   /// For tests: changes the map when tracking has ended; may be empty.
   std::function<void(maps::Map&)> alter_map;
-  RunObserver* observer = nullptr;                    ///< who looks on; null: nobody
+  RunObserver* observer = nullptr;                    ///< observer of the run; null: none
   std::function<void(const std::string&)> finishing;  ///< RunRequest::finishing
 };
 
@@ -164,7 +164,7 @@ struct RunContext {
 
 /// Why a result must not be trusted.
 struct Doubt {
-  /// The gravest first: of several the first one is told, and what is lost together with what is apart.
+  /// The gravest first: only the first one is reported, lost frames together with separate components.
   enum class About {
     kLostFrames,
     kComponents,
@@ -207,18 +207,18 @@ class Stage {
 
   /// Binds the options; called once.
   virtual void declare(core::OptionTable& /*table*/) {}
-  /// Checks what needs more than one option, e.g. files named by options. `mark` and `path` are the stage's;
-  /// a problem of path `path`.key is told where the key's value stands.
+  /// Checks that involve more than one option, such as files named by options. `mark` and `path` are the
+  /// stage's; a problem of path `path`.key is reported at the position of the key's value.
   virtual void check(const CheckContext& /*context*/, const core::ConfigMark& /*mark*/,
                      const std::string& /*path*/, core::ConfigProblems& /*problems*/) {}
   /// Asked after check: the files that will be written, relative to the result folder ('*' = a number); no
   /// two stages may write the same.
   [[nodiscard]] virtual std::vector<std::string> files() const { return {}; }
-  /// Asked after check: it writes the map with its clouds to map.db as they come, for which it wants
-  /// TrackedFrame::changes.
+  /// True if the stage writes the map with its clouds to map.db as they come, for which it needs
+  /// TrackedFrame::changes. Called after check.
   [[nodiscard]] virtual bool keeps_map() const { return false; }
   virtual core::Result<void> start(const RunContext& /*context*/) { return {}; }
-  /// Number of frames of a source; asked after start.
+  /// Number of frames of a source; called after start.
   [[nodiscard]] virtual std::size_t frames() const { return 0; }
   /// One frame, when all required per-frame inputs hold a value. Stateless stages are called from several
   /// threads at a time and in any order, serial ones in frame order. An error ends the run; what concerns

@@ -15,7 +15,7 @@ struct RunSummary {
 /// Most memory this process ever held, MB.
 double peak_rss_mb();
 
-/// Memory this process holds now, MB; NaN where the system does not tell.
+/// Memory this process holds now, MB; NaN if the system does not report it.
 double rss_mb();
 
 }  // namespace plumbline::pipeline

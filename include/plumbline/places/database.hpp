@@ -16,17 +16,17 @@
 
 namespace plumbline::places {
 
-/// One keyframe and how much it looks like what was asked for.
+/// One keyframe and its similarity to the query.
 struct Hit {
   core::KeyframeId keyframe;
   double score = 0.0;  ///< s of docs/method/places.md: 0 nothing in common, 1 the same
 };
 
-/// Keyframes of any number of robots. The vocabulary is divided while keyframes are added: a fixed
-/// number of words per keyframe at most, each of a bounded number of features, so that the cost of a keyframe
-/// does not grow with their number. Vectors of earlier keyframes follow at once (their features move to the
-/// new words); the weights log(N / n_w) are taken anew whenever the dictionary has grown by a quarter. The
-/// result depends on nothing but the order in which keyframes were added.
+/// Keyframes of any number of robots. The vocabulary is divided while keyframes are added: a fixed number of
+/// words per keyframe at most, each of a bounded number of features, so that the cost of a keyframe does not
+/// grow with their number. Vectors of earlier keyframes are updated at once (their features move to the new
+/// words); the weights log(N / n_w) are recomputed whenever the dictionary has grown by a quarter. The result
+/// depends only on the order in which keyframes were added.
 class Database {
  public:
   explicit Database(Vocabulary vocabulary) : vocabulary_(std::move(vocabulary)) { reweigh(); }

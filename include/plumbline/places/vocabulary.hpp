@@ -46,7 +46,8 @@ class Vocabulary {
   /// features, because their decision is final.
   [[nodiscard]] bool overfull(Word word) const;
   /// Divides a word into children, seeded by its number; `members` are the descriptors of all its features.
-  /// Returns the new word of each; empty when they do not differ enough (asked again when twice as many).
+  /// Returns the new word of each; empty if they do not differ enough (tried again when there are twice as
+  /// many).
   std::vector<Word> divide(Word word, const std::vector<features::Descriptor256>& members);
 
   [[nodiscard]] std::size_t node_count() const { return nodes_.size(); }

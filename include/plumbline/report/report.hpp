@@ -29,9 +29,9 @@ struct ReportSummary {
 };
 
 /// Writes the page: one file that holds its pictures and needs nothing else, the same bytes for the same
-/// folder. What is missing or damaged in the folder is left out and told, on the page and in `missing`.
-/// Errors: kInput (no result, a run that was interrupted, summary.json damaged, no truth that fits), kUsage
-/// (the file exists), kOutput (cannot be written; nothing is left behind).
+/// folder. Missing or damaged parts of the folder are left out and reported, on the page and in `missing`.
+/// Errors: kInput (no result, an interrupted run, summary.json damaged, no truth that fits), kUsage (the file
+/// exists), kOutput (cannot be written; nothing is left behind).
 core::Result<ReportSummary> write_report(const ReportRequest& request, const core::Executor& executor,
                                          core::Log& log);
 

@@ -68,7 +68,7 @@ struct Camera {
 
 /// Reads our own camera file (camera.yaml: model width height fx fy cx cy distortion depth_scale fps readout
 /// depth_slope depth_delay [color_from_depth, depth: {width height fx fy cx cy model distortion}]). All
-/// problems are told together with file:line:column (kUsage).
+/// problems are reported together with file:line:column (kUsage).
 core::Result<Camera> read_camera(const std::filesystem::path& file);
 /// The same of the file's text; `file_name` is for messages.
 core::Result<Camera> parse_camera(const std::string& text, const std::string& file_name);

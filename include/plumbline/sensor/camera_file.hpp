@@ -16,8 +16,8 @@ namespace plumbline::sensor {
 struct CameraReading {
   Camera camera;
   std::string program;             ///< whose kind of file it is; "" is our own
-  bool has_size = true;            ///< else color.width and color.height are 0: the images have to tell
-  bool has_depth_scale = true;     ///< else depth_scale is only a default: the layout has to tell
+  bool has_size = true;            ///< else color.width and color.height are 0: taken from the images
+  bool has_depth_scale = true;     ///< else depth_scale is only a default: taken from the layout
   std::vector<std::string> notes;  ///< what was decided or converted while reading, one phrase each
 };
 

@@ -24,7 +24,7 @@ struct Face {
   Eigen::Vector3d normal;                ///< unit, outwards: u_axis x v_axis
   std::vector<Eigen::Vector2d> polygon;  ///< counter-clockwise seen from outside, (u, v) metres
   std::string material;                  ///< a name that material_names() lists
-  int seed = 0;                          ///< tells apart prints of the same material
+  int seed = 0;                          ///< distinguishes prints of the same material
   double stretch_u = 0.0;                ///< one copy of the texture covers this many metres; 0 = tiles
   double stretch_v = 0.0;
   int object = -1;  ///< index into Scene::objects
@@ -95,7 +95,8 @@ struct Scene {
 };
 
 /// `name_or_file`: a shipped scene (a file of `scenes_folder` without .yaml) or a path. All problems of the
-/// file are told together as file:line:column: key: what is wrong; an unknown name comes with a suggestion.
+/// file are reported together as file:line:column: key: what is wrong; an unknown name comes with a
+/// suggestion.
 core::Result<Scene> load_scene(const std::string& name_or_file, const std::filesystem::path& scenes_folder);
 
 /// The same from YAML text; `file_name` is for messages.

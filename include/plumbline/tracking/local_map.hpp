@@ -32,8 +32,8 @@ struct LocalMap {
   std::vector<WorldSurface> surface;  ///< interleaved, so that any prefix is spread over all keyframes
 };
 
-/// Keyframes that share landmarks with `reference`, filled up with those that were made last and look the
-/// same way (where there is no texture, nothing else tells that they overlap); their landmarks and surfaces.
+/// Keyframes that share landmarks with `reference`, filled up with the latest ones that look the same way
+/// (without texture, nothing else shows that they overlap); their landmarks and surfaces.
 LocalMap build_local_map(const maps::Map& map, core::KeyframeId reference, const LocalMapOptions& options);
 
 }  // namespace plumbline::tracking

@@ -27,7 +27,7 @@ class MotionModel {
   void update(double stamp, const TrackResult& result);
   /// A frame was not.
   void lost();
-  /// Takes back all poses found since so many frames were lost.
+  /// Takes back all poses found after the first `frames` lost ones.
   void lost_since(int frames) { lost_frames_ = frames; }
   /// The camera turned up elsewhere: the past says nothing.
   void reset();
@@ -52,7 +52,7 @@ class MotionModel {
   [[nodiscard]] bool may_dead_reckon() const {
     return continuous() && dead_reckoning_s_ < (knows_odometry() ? 20.0 : 2.5);
   }
-  /// Odometry tells the way from the last tracked frame to the one that is looked for.
+  /// True if odometry gives the motion from the last tracked frame to the present one.
   [[nodiscard]] bool knows_odometry() const { return valid_ && odometry_ && last_odometry_; }
   /// Measurements have contradicted it since surfaces have been all but alone.
   [[nodiscard]] bool contradicted() const { return contradicted_; }
@@ -75,7 +75,7 @@ class MotionModel {
   int lost_frames_ = 0;
   double dead_reckoning_s_ = 0.0;  ///< time for which it has held unmeasured directions
   bool contradicted_ = false;
-  std::optional<geometry::Rigid3> odometry_;       ///< of the frame that is looked for
+  std::optional<geometry::Rigid3> odometry_;       ///< of the present frame
   std::optional<geometry::Rigid3> last_odometry_;  ///< of the last tracked frame
 };
 

@@ -38,7 +38,7 @@ struct TrackerOptions {
   bool depth = true;
   bool photometric = true;
   bool align_stamps = true;
-  bool thumbnails = true;    ///< small images tell where the camera may be
+  bool thumbnails = true;    ///< search for the pose with small images
   bool motion_prior = true;  ///< the motion model holds what measurements leave open
   bool pnp_start = false;  ///< every frame begins with PnP, where there are matches enough (METHOD section 2)
   /// Time from the first to the last row of an image, s; 0: all at once. What it shears is put right before
@@ -104,7 +104,7 @@ class Tracker {
   /// unchanged. A readout of 0 is a global shutter's.
   void set_shutter(std::optional<double> readout_s);
 
-  /// The camera turned out to be another one: what is kept of keyframes' intensities is made anew.
+  /// Adapts the intensities that are kept of keyframes to a refined camera.
   void recalibrate(const sensor::Recalibration& change) { photometric_.recalibrate(change); }
 
   /// The map has changed, or another keyframe becomes the reference: where the last pose lies now.
@@ -129,9 +129,9 @@ class Tracker {
   using PlaceFinder = std::function<std::vector<core::KeyframeId>(const features::FrameFeatures&)>;
   void set_place_finder(PlaceFinder finder) { find_places_ = std::move(finder); }
 
-  /// Who can tell whether a pose that was found by appearance, near `keyframe`, is where the image was
-  /// taken and not a place that looks the same. Asked before such a pose is believed; without one it is
-  /// believed.
+  /// Function that decides whether a pose that was found by appearance, near `keyframe`, is where the image
+  /// was taken and not a place that looks the same. Called before such a pose is believed; without it every
+  /// pose is.
   using PlaceJudge =
       std::function<bool(const sensor::RgbdFrame&, const features::FrameFeatures&, core::KeyframeId keyframe,
                          const geometry::Rigid3& camera_from_world)>;

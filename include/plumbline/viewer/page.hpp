@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The viewer as HTML that holds everything and asks for nothing: WebGL 2 of its own, data in the page.
+// The viewer as HTML that contains everything and loads nothing: WebGL 2 code and data in the page.
 #include <string>
 #include <string_view>
 

@@ -44,7 +44,7 @@ struct SvgBackground {
 };
 
 struct SvgChart {
-  std::string title;             ///< over the chart in files; in pages told to those who cannot see it
+  std::string title;             ///< over the chart in files; in pages for screen readers
   std::string x_label, y_label;  ///< with units: "time (s)"
   int width_px = 1000;           ///< of the drawing, which the page may scale
   int height_px = 170;           ///< equal_aspect: found from the data

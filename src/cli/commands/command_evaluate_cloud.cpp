@@ -77,7 +77,7 @@ core::Result<void> write_error_clouds(const evaluate::SurfaceSamples& cloud,
 core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
   if (auto applied = request.flags.apply(); !applied) return applied;
   if (!request.trajectories.empty() && request.command->count("--align") == 0) {
-    request.options.align = evaluate::CloudAlignment::kSe3;  // who names a start wants to be aligned
+    request.options.align = evaluate::CloudAlignment::kSe3;  // a given start implies alignment
   }
 
   if (!request.output.empty() && request.reference.empty()) {
@@ -111,7 +111,7 @@ core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
     return tl::unexpected<core::Error>(std::move(error));
   }
 
-  if (request.json) {  // the table for people tells them itself
+  if (request.json) {  // the table for people contains them
     for (const std::string& warning : report->warnings) session.console().warning(warning);
   }
 

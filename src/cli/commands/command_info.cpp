@@ -150,7 +150,7 @@ core::Result<void> describe_recording(Session& session, InfoRequest& request) {
   return {};
 }
 
-/// Its topics first: they are told also where no recording can be made of them.
+/// Describes a bag, its topics first: they are listed even if no recording can be made of them.
 core::Result<void> describe_bag(Session& session, InfoRequest& request) {
   const auto topics = dataset::bag_to_text(request.input, request.open.topics);
   if (!topics) return tl::unexpected<core::Error>(topics.error());

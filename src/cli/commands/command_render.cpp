@@ -93,7 +93,7 @@ core::Result<void> add_paths(const maps::MapPlace& place, bool lines, viz::Scene
   return {};
 }
 
-/// One value per point, as the colour mode wants.
+/// Adds one value per point, for the colour mode.
 core::Result<void> add_scalars(const cloud::CloudFile& file, const fs::path& input, viz::ColorMode mode,
                                viz::Scene& scene) {
   const auto missing = [&](const char* what) {

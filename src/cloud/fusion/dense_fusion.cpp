@@ -23,7 +23,7 @@ constexpr double kCell_m = 0.1;  ///< of plans and colours; also the margin of t
 /// Edge of the blocks of surfels: wide enough for a plane through noise, narrow enough for furniture.
 double block_m(double voxel_m) { return std::max(0.02, 2.0 * voxel_m); }
 
-/// Occupied cells that `megabytes` hold at so many bytes for one side of a voxel.
+/// Number of occupied cells that `megabytes` can hold, with `bytes_per_side` for each voxel side.
 std::size_t cells_within(double megabytes, double bytes_per_side, const DenseFusionOptions& options) {
   constexpr double kLayers = 1.2;  // occupied voxels per voxel of a cell's side
   const double per_axis = std::max(1.0, kCell_m / options.voxels.voxel_m);

@@ -59,7 +59,7 @@ NearViews views_near(const Eigen::AlignedBox3d& box, const std::vector<DepthRast
   return views;
 }
 
-/// Counts the evidence of the views about each of the surfels `asked`.
+/// Counts the views' evidence for each of the surfels `asked`.
 void count(const std::vector<std::uint32_t>& asked, const std::vector<Eigen::Vector3f>& positions,
            const std::vector<NearView>& views, std::vector<Votes>& votes) {
   if (asked.empty()) return;

@@ -30,14 +30,14 @@ struct Grid {
 };
 
 /// Mean of 1/z over window x window pixels (odd) around every stride-th pixel, over the pixels that lie on
-/// the same surface as far as depth tells. 0 where the pixel itself has no depth within [min, max].
+/// the same surface according to their depth. 0 if the pixel itself has no depth within [min, max].
 Grid smooth_inverse_depth(const cv::Mat& depth, int stride, int window, float min_depth, float max_depth,
                           float focal);
 
-/// One more pass of means, over three cells `step` apart along rows and then along columns: where the noise
-/// of the means so far, `noise` times that of one measurement, is more than `wanted_m` metres and the three
-/// lie on a line as far as that noise tells. A plane of any slant stays a plane, a step or fold stays as it
-/// is.
+/// One more pass of means, over three cells `step` apart along rows and then along columns. It is applied if
+/// the noise of the means so far (`noise` times that of one measurement) exceeds `wanted_m` metres, and the
+/// three cells lie on a line within that noise. A plane of any slant stays a plane, a step or fold is not
+/// changed.
 void widen_means(Grid& inverse_depth, int step, float noise, float wanted_m);
 
 /// For every cell how many cells the surface goes on in a direction without a jump, at most `longest`.

@@ -39,7 +39,7 @@ void append_filtered(const SurfaceCloud::Ptr& part, float voxel_m, bool independ
   result += means;
 }
 
-/// The tree that pcl::KdTreeFLANN builds, asked as FLANN itself asks it: its knnSearch, which PCL calls,
+/// The tree that pcl::KdTreeFLANN builds, searched by FLANN's own functions: its knnSearch, which PCL calls,
 /// opens a parallel region of OpenMP for every point, which costs twice as much as the search.
 class SerialSearch : public SurfaceSearch::Tree {
  public:

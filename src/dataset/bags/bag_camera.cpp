@@ -96,7 +96,7 @@ class Transforms {
     for (const TransformMessage& t : transforms)
       parents_.try_emplace(frame_name(t.child), frame_name(t.parent), t.parent_from_child);
   }
-  /// None when the frames do not hang together.
+  /// Transform between two frames; none if they are not connected.
   [[nodiscard]] std::optional<Rigid3> between(const std::string& target, const std::string& source) const {
     const auto target_path = to_root(target);
     const auto source_path = to_root(source);

@@ -51,8 +51,8 @@ class BagFile {
   using Visit = std::function<void(const BagEntry&)>;
 
   virtual ~BagFile() = default;
-  /// Every message in the order of the file. What is damaged or cut off is left out and told by notes().
-  /// Error (kInput): nothing at all can be read.
+  /// Visits every message in the order of the file. Damaged or missing parts are left out and reported by
+  /// notes(). Error (kInput): nothing can be read.
   virtual core::Result<void> scan(const Visit& visit) = 0;
   /// The whole of one message. Error (kInput): names the file and the place in it.
   [[nodiscard]] virtual core::Result<Bytes> read(const MessagePlace& place) const = 0;

@@ -48,8 +48,8 @@ class BagImages final : public MessageImages {
   ImageList depth_;
 };
 
-/// A stamp far from when its message was logged, unlike all others, is a damaged one where the message itself
-/// cannot be read; a chunk's checksum tells.
+/// Drops images whose stamp is far from the time at which they were logged, unlike all others, if the message
+/// itself cannot be read: the stamp is damaged, as a chunk's checksum confirms.
 std::size_t drop_damaged(const BagSurvey& survey, std::vector<ImageEntry>& images) {
   constexpr double kSuspicious_ns = 60e9;
   if (images.empty()) return 0;

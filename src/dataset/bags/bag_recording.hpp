@@ -7,8 +7,8 @@
 
 namespace plumbline::dataset {
 
-/// Layout::images gives the images; Layout::camera is there where the bag tells it. Errors (kInput, kUsage):
-/// no bag, topics that cannot be told, no pairs.
+/// Reads a bag. Layout::images gives the images; Layout::camera is set if the bag contains it. Errors
+/// (kInput, kUsage): not a bag, ambiguous topics, no pairs.
 core::Result<Layout> read_bag(const std::filesystem::path& path, const TopicNames& topics,
                               const LayoutOptions& options, core::Log& log);
 

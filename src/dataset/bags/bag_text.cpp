@@ -41,7 +41,7 @@ core::Result<std::string> bag_to_text(const std::filesystem::path& path, const T
   for (const SurveyedTopic& topic : survey->topics) text += topic_line(topic);
   for (const std::string& note : survey->notes) text += "damaged: " + note + "\n";
   const auto chosen = choose_topics(*survey, named);
-  if (!chosen) return text;  // why not is told by who opens it
+  if (!chosen) return text;  // opening it reports the reason
   return text + choice_text(*chosen);
 }
 

@@ -16,7 +16,7 @@ namespace plumbline::dataset {
 namespace {
 
 constexpr int kAsItIs = -1;  // no conversion
-// A few bytes of RVL can stand for any number of zeros, so nothing but this bounds what they ask for.
+// A few bytes of RVL can stand for any number of zeros, so only this limits the memory for them.
 constexpr std::uint64_t kMostRvlPixels = std::uint64_t{1} << 24;
 
 /// Rule by which the bytes of one encoding become an image.

@@ -9,7 +9,7 @@
 
 namespace plumbline::dataset {
 
-/// `pixels` depths of `size` bytes; none when they do not hold so many.
+/// Decodes `pixels` depths from `size` bytes; none if there are not that many.
 std::optional<std::vector<std::uint16_t>> decode_rvl(const std::uint8_t* data, std::size_t size,
                                                      std::size_t pixels);
 

@@ -72,7 +72,7 @@ const MessageDecoder* decoder_of(const BagReaders& readers, const std::string& e
   return encoding == "ros1" ? &readers.ros1() : nullptr;
 }
 
-/// Goes through files and collects what the survey wants.
+/// Goes through files and collects the survey.
 class Surveyor {
  public:
   Surveyor(BagSurvey& survey, const BagReaders& readers) : survey_(survey), readers_(readers) {}
@@ -85,7 +85,7 @@ class Surveyor {
     const auto file = static_cast<std::uint32_t>(survey_.files.size());
     auto scanned = bag->scan([&](const BagEntry& entry) { visit(*bag, file, entry); });
     if (!scanned) return scanned;
-    // Topics without a message are told too.
+    // Topics without a message are listed too.
     for (std::size_t i = 0; i < bag->topics().size(); ++i) topic_of(*bag, i);
     survey_.notes.insert(survey_.notes.end(), bag->notes().begin(), bag->notes().end());
     if (survey_.camera_yaml.empty()) survey_.camera_yaml = bag->camera_yaml();

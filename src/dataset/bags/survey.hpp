@@ -26,7 +26,7 @@ struct SurveyedTopic {
   std::int64_t first_ns = 0;  ///< when messages were logged
   std::int64_t last_ns = 0;
   std::vector<ImageEntry> images;    ///< of image topics: all, in the order of the bag
-  std::vector<MessagePlace> others;  ///< of small messages that tell something about cameras: the first few
+  std::vector<MessagePlace> others;  ///< the first few of the small messages about cameras
 
   [[nodiscard]] bool is(const char* type) const { return topic.type == type; }
   [[nodiscard]] bool has_images() const {

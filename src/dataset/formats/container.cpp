@@ -58,7 +58,7 @@ ContainerContents contents_of(const AVFormatContext& context) {
 }
 
 void* open_container(const char* file, ContainerContents& contents) {
-  av_log_set_level(AV_LOG_QUIET);  // what is wrong with a file is told by those who know which one it is
+  av_log_set_level(AV_LOG_QUIET);  // callers, which know the file, report what is wrong with it
   AVFormatContext* context = nullptr;
   const AVInputFormat* matroska = av_find_input_format("matroska");
   if (matroska == nullptr || avformat_open_input(&context, file, matroska, nullptr) < 0) return nullptr;

@@ -39,7 +39,7 @@ class MemoryStream : public Imf::IStream {
   std::size_t at_ = 0;
 };
 
-/// The channel that depth is in, "" if it cannot be told.
+/// Name of the channel that holds depth, "" if it is ambiguous.
 std::string depth_channel(const Imf::ChannelList& channels) {
   for (const char* name : {"Z", "Y", "R"}) {
     if (channels.findChannel(name) != nullptr) return name;

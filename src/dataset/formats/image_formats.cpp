@@ -19,8 +19,8 @@ cv::Mat decode(const Bytes& file) {
 
 Bytes encode_png(const cv::Mat& image, int level) {
   Bytes bytes;
-  // Left to itself OpenCV packs at level 1 what differs from the left neighbour; told to, it tries all
-  // filters on each row, which takes 1.7 times as long and makes the file no smaller.
+  // By default OpenCV packs the differences from the left neighbour at level 1; with a given level it tries
+  // all filters on each row, which takes 1.7 times as long and makes the file no smaller.
   std::vector<int> how;
   if (level != 1) how = {cv::IMWRITE_PNG_COMPRESSION, level};
   try {

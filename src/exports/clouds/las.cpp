@@ -122,7 +122,7 @@ void put_las_header(core::OutputFile& out, const LasLayout& layout, const LasSte
                     const Eigen::AlignedBox3d& box, std::uint64_t points) {
   out.write("LASF");
   out.put(std::uint16_t{0});         // file source
-  out.put(std::uint16_t{1U << 4U});  // coordinate systems are told as WKT
+  out.put(std::uint16_t{1U << 4U});  // coordinate systems are given as WKT
   put_fixed<16>(out, "");            // project
   out.put(std::uint8_t{1});
   out.put(std::uint8_t{4});

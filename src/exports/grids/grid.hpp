@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A map from above as cells: what is in the way, what is free, what nobody saw.
+// A map from above as cells: occupied, free, not seen.
 #include <cstdint>
 #include <vector>
 

@@ -16,7 +16,7 @@ struct ViewRays {
 };
 
 /// Calls `take` with the rays of each view of the map, in order; of each view about one ray in 6 x 6 pixels.
-/// Progress is told. Errors (kInput): no map.db, or damaged; those of `take`.
+/// Progress is reported. Errors (kInput): no map.db, or damaged; those of `take`.
 core::Result<void> for_each_view(const MapSource& source,
                                  const std::function<core::Result<void>(const ViewRays&)>& take);
 

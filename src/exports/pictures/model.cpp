@@ -170,7 +170,7 @@ core::Result<void> write_pictures(const MapSource& source, const Pictures& recor
   if (depth) {
     if (auto made = core::make_folder(folder / "depth"); !made) return made;
   }
-  constexpr std::size_t kAtOnce = 16;  // so that progress is told, and memory bounded
+  constexpr std::size_t kAtOnce = 16;  // for progress reports and bounded memory
   std::vector<core::Result<void>> written(pictures.size());
   std::vector<std::string> lost(pictures.size());
   for (std::size_t first = 0; first < pictures.size(); first += kAtOnce) {

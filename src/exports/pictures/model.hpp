@@ -34,8 +34,8 @@ core::Result<std::vector<ModelPoint>> model_points(MapSource& source, const std:
 /// Pinhole of a robot's pictures.
 sensor::Pinhole pinhole_of(const MapSource& source, std::int32_t robot);
 
-/// images/NAME.png of each picture that has a frame, and depth/NAME.png (16 bit, millimetres) if `depth`. A
-/// frame that cannot be read loses its number and is told in a note. Errors (kOutput).
+/// Writes images/NAME.png of each picture that has a frame, and depth/NAME.png (16 bit, millimetres) if
+/// `depth`. A frame that cannot be read loses its number, and a note says so. Errors (kOutput).
 core::Result<void> write_pictures(const MapSource& source, const Pictures& recordings,
                                   std::vector<Picture>& pictures, const std::filesystem::path& folder,
                                   bool depth, ExportSummary& summary);

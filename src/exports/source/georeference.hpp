@@ -20,7 +20,7 @@ namespace plumbline::exports {
 struct Georeference {
   int epsg = 0;
   std::string name;  ///< of the system
-  std::string wkt;   ///< OGC well-known text, version 1, as LAS wants it
+  std::string wkt;   ///< OGC well-known text, version 1, as required by LAS
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   double turn = 0.0;   ///< of the map's x axis from east, radians, counter-clockwise
   double scale = 1.0;  ///< of the projection at the origin; heights stay

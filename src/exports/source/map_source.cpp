@@ -38,7 +38,7 @@ Eigen::Vector3d position_of(const cloud::Point& point, const cloud::CloudFile& f
   return point.getVector3fMap().cast<double>() + file.shift;
 }
 
-/// The points that `keep` wants, with their columns.
+/// Points that `keep` selects, with their columns.
 template <typename Keep>
 cloud::CloudFile picked(const cloud::CloudFile& file, const Keep& keep) {
   std::vector<std::size_t> indices;
@@ -103,7 +103,7 @@ core::Result<MapSource> MapSource::open(const ExportRequest& request, const core
   source.progress_ = &progress;
   source.cloud_only_ = is_cloud_file(request.input);
   if (source.cloud_only_) {
-    source.upright_ = true;  // as far as anybody can tell
+    source.upright_ = true;  // as far as is known
   } else if (auto opened = source.open_map(); !opened) {
     return tl::unexpected(opened.error());
   }

@@ -47,7 +47,7 @@ class MapSource {
   [[nodiscard]] const maps::MapPlace& place() const { return place_; }
   /// From the map's own frame into that of everything that is exported.
   [[nodiscard]] const geometry::Rigid3& world_from_map() const { return world_from_map_; }
-  /// z is up. Errors (kInput): it is not, with the way out; `what` asks for it.
+  /// Checks that z is up. Errors (kInput): it is not, with advice; `what` is the export that needs it.
   [[nodiscard]] core::Result<void> need_upright(const std::string& what) const;
   /// Description of the frame, one line, for files that hold text.
   [[nodiscard]] std::string frame_text() const;
@@ -87,7 +87,7 @@ class MapSource {
   geometry::Rigid3 world_from_map_;
   bool upright_ = false;
   std::optional<cloud::CloudFile> whole_;
-  double whole_voxel_m_ = 0.0;  ///< that it was laid down in; 0: as the run did
+  double whole_voxel_m_ = 0.0;  ///< voxel size of the whole cloud; 0: that of the run
   std::optional<cloud::CloudFile> chosen_;
   Eigen::AlignedBox3d selected_;
   double floor_m_ = 0.0;

@@ -12,8 +12,8 @@
 
 namespace plumbline::exports {
 
-/// One recording for each robot. Frames are rectified as the map's latest version of the camera wants it:
-/// into the pinhole of RobotInfo::camera.
+/// One recording for each robot. Frames are rectified with the map's latest version of the camera, into the
+/// pinhole of RobotInfo::camera.
 class Pictures {
  public:
   /// Opens the request's recordings, or else those the map was made from. Errors (kInput): they are gone or

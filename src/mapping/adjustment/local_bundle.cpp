@@ -107,7 +107,8 @@ class Builder {
     }
   }
 
-  /// The first keyframe of a map hangs on nothing; in a window without another that is held the oldest is.
+  /// The first keyframe of a map has no parent; if nothing else in the window is held, the oldest keyframe
+  /// is.
   LocalBundle take() {
     std::vector<optimize::BundlePose>& poses = bundle_.problem.poses;
     if (std::none_of(poses.begin(), poses.end(), [](const auto& pose) { return pose.fixed; })) {

@@ -50,8 +50,7 @@ struct SharedPlace {
   Eigen::Vector3d normal_in_b;
 };
 
-/// b_from_a that lays the places on one another as well as images and depth can tell: Gauss-Newton from
-/// `start`.
+/// b_from_a that best aligns the places according to images and depth: Gauss-Newton from `start`.
 Rigid3 aligned(const std::vector<SharedPlace>& places, const sensor::Pinhole& image, const Rigid3& start) {
   constexpr int kIterations = 3;
   constexpr double kSigma_px = 0.5;

@@ -12,7 +12,7 @@ namespace plumbline::mapping {
 namespace {
 
 constexpr int kDepthIsBack = 50;     // corners with depth
-constexpr double kWellWithin = 0.8;  // of the limits: else the next frame would ask again
+constexpr double kWellWithin = 0.8;  // of the limits: otherwise the next frame would trigger again
 constexpr int kFewNormals = 10;      // landmarks: fewer say nothing about cones
 
 struct ViewOverlap {
@@ -50,7 +50,7 @@ int points_with_depth(const features::FrameFeatures& features) {
                                         [](const features::PointFeature& f) { return f.depth > 0.0F; }));
 }
 
-/// In a scene that has fewer landmarks than a rule asks for, half of what should be seen will do.
+/// If a scene has fewer landmarks than a rule requires, half of those that should be seen suffice.
 bool enough(std::size_t matched, int wanted, std::size_t visible) {
   return 2 * matched >= std::min(2 * static_cast<std::size_t>(wanted), visible);
 }

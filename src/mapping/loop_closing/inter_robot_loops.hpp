@@ -18,8 +18,8 @@ class InterRobotLoops {
                   std::shared_ptr<const OtherMapsInbox> inbox)
       : options_(options), camera_(camera), inbox_(std::move(inbox)) {}
 
-  /// camera_from_world of the only keyframe of `image`, in the world of the robot that asks. The database
-  /// holds own keyframes, and gets others' as they come.
+  /// camera_from_world of the only keyframe of `image`, in the world of this robot. The database holds its
+  /// own keyframes, and gets the others' as they arrive.
   std::optional<geometry::Rigid3> locate(places::Database& database, const maps::Map& image);
   /// Loops between keyframes of the robot's own map that ended at `keyframe`: those that contradict their
   /// present poses by more than their own errors explain.

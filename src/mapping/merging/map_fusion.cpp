@@ -19,8 +19,8 @@ constexpr std::size_t kAroundPair = 4;  // keyframes around each end of a pair w
 /// Poses of the parts in the anchor's group, and the keyframes that tie them together.
 struct Layout {
   std::map<std::size_t, Rigid3> anchor_from_part;
-  std::vector<std::pair<KeyframeId, KeyframeId>>
-      ties;  ///< root of a part, and the keyframe that becomes its parent
+  /// Root of a part, and the keyframe that becomes its parent.
+  std::vector<std::pair<KeyframeId, KeyframeId>> ties;
 };
 
 /// Ties a part to those that are laid out already, by the pair of keyframes that share most.

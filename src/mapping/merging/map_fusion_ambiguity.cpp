@@ -15,9 +15,9 @@ using geometry::Rigid3;
 
 constexpr double kApart_m = 1.0;     // another place: more than maps drift within what they share
 constexpr double kTurned_rad = 0.3;  // ... or so far turned
-constexpr int kFewLandmarks = 30;    // tell nothing
+constexpr int kFewLandmarks = 30;    // too few for a decision
 constexpr double kWrong = 0.2;       // share of landmarks seen through where maps do not belong together
-// Thresholds that rule out an alignment against which no landmark speaks: so many surfaces seen through ...
+// Thresholds that rule out an alignment that no landmark contradicts: this many surfaces seen through ...
 constexpr double kNoAlternative = 0.2;
 constexpr int kSurfaces = 500;
 // ... or fewer, where landmarks match at a spot or two: an edge or a strip is alike all along itself.

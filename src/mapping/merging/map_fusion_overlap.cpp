@@ -155,7 +155,7 @@ std::vector<OverlapFinder::Candidate> OverlapFinder::look_at_all(const std::vect
       before = id;
     }
   }
-  constexpr std::size_t kAtATime = 256;  // scores of so many take memory at a time
+  constexpr std::size_t kAtATime = 256;  // keyframes scored at a time, to bound memory
   std::vector<Candidate> candidates;
   for (std::size_t first = 0; first < queries.size(); first += kAtATime) {
     std::vector<places::Database::Scores> scores(std::min(kAtATime, queries.size() - first));

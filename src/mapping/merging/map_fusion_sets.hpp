@@ -51,7 +51,7 @@ std::vector<VerifiedPair> verify_neighbours(const PartPair& maps, const PairSets
 /// Holds the alignment, and others that the remaining sets or a step by which things repeat speak for,
 /// against the maps.
 Ambiguity ambiguity_of(const PartPair& maps, const PairSets& sets, const geometry::Rigid3& a_from_b);
-/// Why it forbids to merge maps of which so many keyframes agree; empty: it does not.
+/// Reason against merging maps of which `agreeing` keyframes agree; empty: there is none.
 std::string objection(const Ambiguity& ambiguity, int agreeing, const MapFusionOptions& options);
 
 /// Keyframes of b with a view of a: those that do not agree yet are verified.

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Does one map fit when it is laid over another one, and would it fit elsewhere as well? Where things repeat
-// (doors along a corridor, desks of one kind) the same images allow several answers; an answer is worth
-// believing when the others are contradicted by what was seen. Landmarks that look alike a fixed step apart
-// tell of a repetition even where no keyframe stands at both of its ends: cameras see farther than they go.
+// Evaluates how well one map fits over another one, and whether it would fit elsewhere as well. Where things
+// repeat (doors along a corridor, identical desks) the same images allow several answers; an answer is
+// credible if the others are contradicted by what was seen. Similar landmarks a fixed step apart reveal a
+// repetition even if no keyframe stands at both of its ends: cameras see farther than they go.
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -25,7 +25,7 @@ class MapOverlay {
   struct Surfaces {
     int there = 0;
     int through = 0;
-    /// More than this share of no fewer than so many was seen through.
+    /// True if at least `least` landmarks, and more than this share, were seen through.
     [[nodiscard]] bool contradict(double share, int least) const {
       return there + through >= least && through > share * (there + through);
     }

@@ -14,7 +14,8 @@ using core::KeyframeId;
 using geometry::Matrix6d;
 using geometry::Rigid3;
 
-/// A pair is looked up once, by its newer keyframe, so more of them are tried than where both keyframes ask.
+/// A pair is looked up once, by its newer keyframe, so more candidates are tried than if both keyframes were
+/// looked up.
 constexpr int kPlaces = 8;
 constexpr int kPlacesWhenMet = 1;  // of a robot that has been met
 
@@ -197,8 +198,8 @@ void MergeServer::decide(const Robots& robots, const NewKeyframe& keyframe) {
   if (!std::exchange(pair.met, true)) meet(robots, keyframe);
 }
 
-/// All that hangs together with the two by a pose graph, which may find that other merges were wrong, or this
-/// one is.
+/// Joins all maps connected with the two by a pose graph, which may find that other merges were wrong, or
+/// this one.
 void MergeServer::meet(const Robots& robots, const NewKeyframe& keyframe) {
   std::vector<MergeEvidence> all = merges();
   const std::size_t anchor = connected_parts(work_.parts.size(), all)[robots.first];
@@ -220,7 +221,7 @@ void MergeServer::take_back(const Robots& robots, const MergeEvidence& evidence,
                             const NewKeyframe& keyframe) {
   RobotPair& pair = work_.pairs[robots];
   pair.met = false;
-  if (pair.step != MeetingStep::kMet) return;  // no robot was told
+  if (pair.step != MeetingStep::kMet) return;  // it was not reported to any robot
   pair.step = MeetingStep::kLocalMapAsked;
   work_.events.push_back(
       {MeetingStep::kTakenBack, robots.first, robots.second, keyframe.frame, keyframe.id, evidence, nullptr});

@@ -54,7 +54,7 @@ pcl::Indices spread(const SurfaceCloud& cloud, const pcl::Indices& some, int wan
   return result;
 }
 
-/// Points of a surface that have a counterpart on another one, and of how many that were asked.
+/// Points of a surface that have a counterpart on another one, and the number of points tested.
 struct Overlap {
   pcl::Indices points;
   double share = 0.0;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Certificates and signed permissions as DDS security wants them, by OpenSSL's library.
+// Certificates and signed permissions for DDS security, made with OpenSSL's library.
 #include <filesystem>
 #include <string>
 #include <vector>

@@ -97,7 +97,7 @@ std::string domain_configuration(const NetworkOptions& options, bool hub) {
   std::string peers;
   for (const std::string& peer : options.peers) peers += fmt::format("<Peer Address=\"{}\"/>", peer);
 
-  // lo may lack multicast: there every possible port is asked.
+  // lo may lack multicast: every possible port is tried there.
   if (local && !tcp && options.peers.empty()) peers = "<Peer Address=\"127.0.0.1\"/>";
 
   // Multicast of data floods a WiFi: it is used for discovery only.
@@ -108,7 +108,7 @@ std::string domain_configuration(const NetworkOptions& options, bool hub) {
   xml += fmt::format("<Transport>{}</Transport>", tcp ? "tcp" : "udp");
   xml += "</General><Discovery>";
 
-  // Number of ports asked at a peer without a port; the default of 9 is too small.
+  // Number of ports to try at a peer without a port; the default of 9 is too small.
   if (!tcp)
     xml += "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>63</MaxAutoParticipantIndex>";
 

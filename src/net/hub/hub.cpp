@@ -118,7 +118,8 @@ std::vector<fs::path> usable_maps(const fs::path& folder, const std::vector<Robo
   return maps;
 }
 
-/// Only the hub learns why somebody with foreign keys gets nothing: lines on certificates become warnings.
+/// Only the hub learns why a participant with foreign keys gets nothing: lines on certificates become
+/// warnings.
 core::Result<std::unique_ptr<HubBus>> open_logged_bus(const NetworkOptions& options, core::Log& log) {
   const bool secured = !options.security.empty();
   return open_hub_bus(options, [&log, secured, reported = 0](const std::string& line) mutable {

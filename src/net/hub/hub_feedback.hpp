@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Sends robots that ask for it the maps of those they share a frame with: rows of the hub's copies without
-// clouds. Each row is sent once, and again after it has changed, a few seconds' changes at a time.
+// Sends the maps of robots that share a frame to each of them that subscribes: rows of the hub's copies
+// without clouds. Each row is sent once, and again after it has changed, a few seconds' changes at a time.
 #include <cstdint>
 #include <map>
 #include <optional>

@@ -32,7 +32,7 @@ class HubMeetings {
   bool step();
   /// Called when nothing more will come: reports all that is left, draws, and removes the log.
   void finish();
-  /// Pose of a robot in the frame that it shares with others; empty: it met nobody.
+  /// Pose of a robot in the frame that it shares with others; empty: it has met no other robot.
   [[nodiscard]] SharedFrame frame(const std::string& robot) const;
   [[nodiscard]] const std::vector<pipeline::Meeting>& meetings() const { return reported_.meetings(); }
 

@@ -214,7 +214,7 @@ void HubServer::receive_chunks(RobotSession& session) {
   }
 }
 
-/// Refuses a robot whose rows are wrong; asks it to wait if this machine cannot store them.
+/// Refuses a robot whose rows are wrong; lets it wait if this machine cannot store them.
 void HubServer::apply_failure(RobotSession& session, const core::Error& error) {
   RobotSession::Reply& reply = session.reply;
   const std::string& name = session.robot.name;

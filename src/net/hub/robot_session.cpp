@@ -118,7 +118,7 @@ core::Result<void> RobotSession::receive(const Chunk& chunk) {
     return {};
   }
 
-  // A chunk before this one was lost: the status tells the robot which.
+  // A chunk before this one was lost; the status reports which.
   if (chunk.after != head) return {};
   if (!same) {
     if (chunk.index != 0) return {};

@@ -17,7 +17,7 @@ struct LinkStatus {
   bool done = false;        ///< it has confirmed that it holds everything
   std::string refused;      ///< why it will never accept this run; empty: it was not refused
   std::string problem;      ///< why it cannot store rows at present
-  std::string location;     ///< pose in the shared frame, for people; empty: this robot met nobody
+  std::string location;     ///< pose in the shared frame, for people; empty: this robot has met no other
   std::int64_t behind = 0;  ///< number of transactions not acknowledged
   std::uint64_t sent_bytes = 0;
   std::uint64_t resent_bytes = 0;             ///< included in sent_bytes

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Maps of other robots at a robot that asked for them: rows from the hub become maps, and those that share a
-// frame with its own are transformed into its world.
+// Maps of other robots at a robot that subscribes to them: rows from the hub become maps, and those that
+// share a frame with its own are transformed into its world.
 #include <cstdint>
 #include <map>
 #include <memory>

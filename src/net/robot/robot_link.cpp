@@ -57,7 +57,7 @@ core::Result<void> RobotLink::follow(const fs::path& store) {
   std::error_code ignored;
   const auto heads = fs::exists(store, ignored) ? maps::store_heads(store) : maps::StoreHeads();
 
-  // The next incarnation: of the run in the ledger, or of this one begun anew with an empty store.
+  // The next incarnation: of the run in the ledger, or of this run, started with an empty store.
   const std::lock_guard<std::mutex> lock(mutex_);
   const bool anew = following() && known->empty();
   RobotStatus next = robot_;

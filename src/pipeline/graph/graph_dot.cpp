@@ -8,7 +8,7 @@
 namespace plumbline::pipeline {
 namespace {
 
-/// Stages of a name that tells their type need no second line.
+/// Stages whose name contains their type need no second line.
 std::string label(const Node& node) {
   if (node.tap) return node.options.specs().empty() ? node.name : node.options.value("file");
   return node.name == node.type->name ? node.name : node.name + "\\n(" + node.type->name + ")";

@@ -50,7 +50,7 @@ std::vector<std::size_t> sorted(const StageSpecs& specs, ConfigProblems& problem
     placed[next] = true;
     order.push_back(next);
   }
-  // Taps come last, so that what they write counts as export and delays nobody.
+  // Taps come last, so that their writing counts as export and delays no stage.
   std::stable_partition(order.begin(), order.end(), [&](std::size_t d) { return !specs[d].node.tap; });
   return order;
 }

@@ -40,7 +40,7 @@ const Keys kAdvanced{
     {"fuse", keys_in("min_cos_incidence")},
 };
 
-/// Options that nobody is known to set: accepted, but not listed anywhere.
+/// Options without a known use: accepted, but not listed anywhere.
 const Keys kInternal{
     {"features", keys_in("line.border_either line.exact_nfa orb.spread")},
     {"track",

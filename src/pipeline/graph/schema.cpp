@@ -45,7 +45,8 @@ Json stage_body(const StageType& type, bool alone) {
   return body;
 }
 
-/// The right definition by `type`: an editor then tells what is wrong with this stage, not with all of them.
+/// The right definition by `type`: an editor then reports what is wrong with this stage, not with all of
+/// them.
 Json stage_rule(const StageRegistry& registry, bool alone) {
   Json cases = Json::array();
   for (const std::string& name : registry.names()) {

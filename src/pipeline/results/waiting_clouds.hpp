@@ -20,7 +20,7 @@ class WaitingClouds {
  public:
   /// Errors (kOutput): no file can be made in the result's folder.
   static core::Result<WaitingClouds> create(const RunContext& context);
-  /// Notes a cloud, and keeps it where nobody else does. Errors (kOutput): disk full.
+  /// Notes a cloud, and stores it unless a stage does. Errors (kOutput): disk full.
   core::Result<void> append(const KeyframeCloud& cloud);
   /// All that came, when all have come. Errors (kInput): they cannot be read back.
   core::Result<const maps::StoreReader*> open();

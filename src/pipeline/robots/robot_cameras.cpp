@@ -11,9 +11,10 @@ namespace {
 // Size of the map when its camera is estimated: keyframes, or seconds of the recording.
 constexpr std::size_t kKeyframes = 40;
 constexpr double kSeconds = 10.0;
-// The answer is waited for so many frames after the question, and used so many after that: by then no frame
-// that it is for has been read, whatever the number of threads. Nobody asks when no frame would be left. Of
-// what is live nobody knows how many frames are to come: the answer is used when there were so many more.
+// Frames from the start of an estimate until its answer is awaited, and from then until it is used: by then
+// no frame for which it is used has been read, for any number of threads. No estimate is started if too few
+// frames would be left. A live source has no known end: the answer is used once that many more frames have
+// arrived.
 constexpr std::size_t kAnswerFrames = 32;
 constexpr std::size_t kLeastFramesLeft = 60;
 constexpr std::size_t kUseFrames = kMostUnderWay + kLeastFramesLeft;
@@ -97,8 +98,8 @@ void RobotCameras::use(std::size_t robot, mapping::Slam& slam) {
 
 void RobotCameras::estimate_finished(const Slams& slams) {
   if (!refine_) return;
-  // A live source ended before the answer was used: it is dropped, as a recording of that length would not
-  // have asked.
+  // A live source ended before the answer was used: it is dropped, because for a recording of that length no
+  // estimate would have been made.
   if (recordings_->live() && !waiting_.empty() && recordings_->size() <= use_from_) {
     cameras_ = given_;
     waiting_.assign(waiting_.size(), false);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The cameras of all robots of a run. The maps are asked what these are: once while they grow, beside the
-// tracker, and again when they are finished (CameraRefinement).
+// The cameras of all robots of a run, estimated from the maps: once while they grow, beside the tracker, and
+// again when they are finished (CameraRefinement).
 #include <cstddef>
 #include <memory>
 #include <vector>
@@ -20,7 +20,7 @@ using Slams = std::vector<std::unique_ptr<mapping::Slam>>;  ///< by robot
 
 class RobotCameras {
  public:
-  /// `refine`: the maps are asked. All must outlive this.
+  /// `refine`: estimate the cameras. All arguments must outlive this.
   RobotCameras(RobotRecordings& recordings, bool refine, const core::Executor& executor, core::Log& log);
 
   /// The robots, with each version that their cameras turned out to be.
@@ -28,10 +28,10 @@ class RobotCameras {
   /// Each camera as far as it is known now.
   [[nodiscard]] std::vector<sensor::Camera> now() const;
 
-  /// Before a frame is tracked: waits for the answer when it is due, and goes on with it from the first frame
-  /// on that is read with it. True: the robot's map was made anew for its camera.
+  /// Called before a frame is tracked: waits for the answer when it is due, and uses it from the first frame
+  /// that is read with it. True: the robot's map was rebuilt for its camera.
   bool before(std::size_t frame, std::size_t robot, const Slams& slams);
-  /// After a frame was tracked: asks the maps as they are now, beside the tracker, once.
+  /// Called after a frame was tracked: starts the estimate from the present maps, beside the tracker, once.
   void after(std::size_t frame, const Slams& slams);
   /// Asks the finished maps, until they have nothing new to say.
   void estimate_finished(const Slams& slams);
@@ -44,7 +44,7 @@ class RobotCameras {
   void doubt(std::vector<Doubt>& reasons) const;
 
  private:
-  /// The maps while they are being asked.
+  /// The maps and cameras of an estimate that is under way.
   struct Question {
     std::vector<CameraRefinement> cameras;  ///< by robot
     std::vector<bool> better;               ///< by robot: the answer

@@ -62,7 +62,7 @@ std::string left_out(const std::vector<RobotMap>& parts, const std::vector<std::
   return text;
 }
 
-/// Components that hang together with nothing.
+/// Components that are connected with nothing.
 std::vector<std::shared_ptr<const MapResult>> components_apart(const std::vector<RobotMap>& parts,
                                                                const std::vector<std::size_t>& used) {
   std::vector<std::shared_ptr<const MapResult>> apart;

@@ -13,7 +13,7 @@
 
 namespace plumbline::pipeline {
 
-/// Two maps that were held against each other.
+/// Comparison of two maps.
 struct RobotMerge {
   std::string a;
   std::string b;
@@ -32,7 +32,7 @@ struct MergedRobots {
   std::size_t refused = 0;  ///< adjustments that would have torn a map
 };
 
-/// Fuses the parts that hang together with `anchor`; parts.size(): with the group that has most keyframes.
+/// Fuses the parts that are connected with `anchor`; parts.size(): the group that has most keyframes.
 MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor,
                           const mapping::MapFusionOptions& options, const core::Executor& executor,
                           core::Log& log);

@@ -135,7 +135,7 @@ bool any_stage(const Graph& graph, Question question) {
                      [&](const Node& node) { return (node.stage.get()->*question)(); });
 }
 
-/// Checks that the pipeline can do what the request asks for.
+/// Checks that the pipeline supports the request.
 core::Result<void> fits(const Graph& graph, const MapRequest& request) {
   if (!request.debug_video.empty() && !any_stage(graph, &Stage::draws_frames)) {
     return core::usage_error(fmt::format(
@@ -272,7 +272,7 @@ class MapRun {
     RunContext context;
     context.executor = &executor_;
     context.log = &log_;
-    // A live camera ends by itself when it is asked to, and all that came is mapped.
+    // A live camera ends by itself on request, and all frames that arrived are mapped.
     context.stop = source_->live() && request_.live == nullptr ? core::StopToken() : stop;
     context.output_folder = output_->path();
     context.input.source = source_.get();

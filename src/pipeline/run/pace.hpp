@@ -23,7 +23,7 @@ class Pace {
 
   /// Waits until the frame may be handed out, or until `stop` is requested.
   void wait_for(std::size_t frame, const core::StopToken& stop);
-  /// True if the frame may be handed out. The clock starts with the first frame that is asked for.
+  /// True if the frame may be handed out. The clock starts with the first query.
   bool is_due(std::size_t frame);
   /// Frames are reported when all is done with them.
   void done(std::size_t frame);

@@ -13,7 +13,7 @@ namespace plumbline::pipeline {
 
 using RunClock = std::chrono::steady_clock;
 
-/// The pipeline that is asked for. Errors: kUsage.
+/// Loads the requested pipeline. Errors: kUsage.
 core::Result<Graph> load_pipeline(const RunRequest& request);
 
 /// Summary of the stages' reports. `began`: start of the whole run so far.
@@ -21,8 +21,8 @@ RunSummary summary_of_run(const Graph& graph, const RunReport& report, const Run
                           const std::string& input, double pace_hz, RunClock::time_point began,
                           const core::Executor& executor);
 
-/// Writes summary.json and what the stages export, and makes the folder the result. An
-/// export that cannot be made is told as a warning: the map is there without it. Errors: kOutput.
+/// Writes summary.json and the stages' exports, and renames the folder to the result. An export that fails
+/// causes a warning only. Errors: kOutput.
 core::Result<void> commit_result(const RunSummary& summary, maps::OutputFolder& output, const Graph& graph,
                                  const RunRequest& request, const RunContext& context);
 

@@ -35,8 +35,8 @@ struct Tick {
 };
 using TickPtr = std::shared_ptr<Tick>;
 
-/// Remembers the failure of the earliest frame. Frames before it are still worked on, so which failure is
-/// told does not depend on the number of threads.
+/// Remembers the failure of the earliest frame. Frames before it are still processed, so which failure is
+/// reported does not depend on the number of threads.
 class FirstFailure {
  public:
   [[nodiscard]] bool any() const { return frame_.load() != kNone; }
@@ -212,7 +212,7 @@ class Runner {
     release(n, tick);
   }
 
-  /// Values that nobody will read any more are given back at once.
+  /// Frees values that no stage will read any more.
   void release(std::size_t n, Tick& tick) const {
     for (std::size_t m = 0; m <= n; ++m) {
       if (last_use_[m] == n) tick.outputs[m].clear();
@@ -267,7 +267,7 @@ class Runner {
     return {};
   }
 
-  /// Taps only write, and are not told.
+  /// Taps only write, and are not reported.
   void report_finishing(std::size_t first, std::size_t count) const {
     if (!context_.hooks.finishing) return;
     std::string names;

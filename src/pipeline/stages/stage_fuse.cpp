@@ -60,8 +60,7 @@ class FuseStage : public Stage {
     return clouds_->append(*io.input<KeyframeCloud>("cloud"));
   }
 
-  /// Poses move until the last optimisation, so the clouds are laid down now, in the order of their
-  /// keyframes.
+  /// Poses move until the last optimisation, so the clouds are fused now, in the order of their keyframes.
   core::Result<void> finish(StageIo& io) override {
     const auto map = io.input<MapResult>("map");
     const auto stored = clouds_->open();

@@ -22,7 +22,7 @@ class MapsStage : public Stage {
   [[nodiscard]] std::size_t frames() const override { return maps_->clouds().size(); }
   [[nodiscard]] bool reads_maps() const override { return true; }
 
-  /// Surfaces are wanted at once; clouds wait where they are until they are laid down.
+  /// Surfaces are needed at once; clouds stay in the store until they are fused.
   core::Result<void> process(StageIo& io) override {
     const maps::StoredCloud& stored = maps_->clouds()[io.frame()];
     auto result = std::make_shared<KeyframeCloud>();

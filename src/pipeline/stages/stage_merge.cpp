@@ -157,7 +157,7 @@ class MergeStage : public Stage {
   }
 
  private:
-  /// Nobody reads frames of finished maps: their poses tell them.
+  /// Frames of finished maps are not read; they are counted from their poses.
   static void report_stored_frames(const MapResult& result, Json& frames) {
     const auto tracked = std::count_if(result.frame_poses.begin(), result.frame_poses.end(),
                                        [](const auto& frame) { return frame.tracked; });

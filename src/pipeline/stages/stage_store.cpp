@@ -101,7 +101,7 @@ class StoreStage : public Stage {
     return writer_->add(step);
   }
 
-  /// All components as one map; each keeps its own frame, as its tree tells.
+  /// All components as one map; each keeps its own frame, given by its tree.
   static maps::Map with_components(const MapResult& map) {
     std::vector<const maps::Map*> all{map.map.get()};
     for (const auto& component : map.apart) all.push_back(component->map.get());

@@ -229,7 +229,7 @@ class TrackStage : public Stage {
 
   /// Path of one robot, for observers.
   struct Way {
-    core::KeyframeId component;       ///< the one that is told of
+    core::KeyframeId component;       ///< component that is reported
     std::optional<std::size_t> last;  ///< of the frame poses
     geometry::Rigid3 odometry_from_camera;
   };

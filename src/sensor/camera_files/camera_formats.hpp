@@ -39,7 +39,7 @@ extern const CameraFormat kScanNetCamera;
 extern const CameraFormat kColmapCamera;
 extern const CameraFormat kPlainCamera;
 
-/// In the order in which they are asked.
+/// All formats, in the order in which they are tried.
 const std::vector<const CameraFormat*>& camera_formats();
 
 /// A reading that knows nothing yet.

@@ -77,7 +77,7 @@ struct Job {
   std::size_t all_frames;
 };
 
-/// Returns how many frames were written; fewer than there are when asked to stop.
+/// Returns the number of frames written; smaller than the total if stopped.
 Result<std::size_t> write_frames(const Job& job, const core::Executor& executor, const core::StopToken& stop,
                                  const Progress& progress) {
   for (const char* sub : {"rgb", "depth"}) {

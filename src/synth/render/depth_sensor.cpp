@@ -184,7 +184,7 @@ class Measurement {
     std::fill(out, out + depth.cols, std::uint16_t{0});
 
     const auto [first, end] = seen_columns(device_, depth.cols, depth.rows, y);
-    int lit = -1;  // the face that `weak` was worked out for, anew every four pixels
+    int lit = -1;  // the face for which `weak` was computed; computed again every four pixels
     float weak = 0.0F;
     for (int x = first; x < end; ++x) {
       float z = depth(y, x);

@@ -33,7 +33,7 @@ cv::Mat1w measure_depth(const World& world, const View& view, Sensor sensor, con
 void add_color_noise(cv::Mat3b& image, Sensor sensor, float gain, const NoiseTiles& tiles,
                      const FrameKey& key);
 
-/// Smears a picture along the motion that `flow` (CV_32FC2, pixels during the exposure, at 1/8 size) tells.
+/// Smears a picture along the motion in `flow` (CV_32FC2, pixels during the exposure, at 1/8 size).
 cv::Mat3b motion_blur(const cv::Mat3b& image, const cv::Mat2f& flow);
 
 /// Range of measurements, metres.

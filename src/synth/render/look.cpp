@@ -53,7 +53,7 @@ FaceView view_face(const World& world, std::size_t index, const sensor::Pinhole&
 }
 
 /// Marks the tiles that edges of faces cross, with the largest inverse depth of these. Between edges one face
-/// covers a tile whole, unless faces cut through each other; its corners tell.
+/// covers a whole tile, unless faces intersect; the tile's corners show that.
 class EdgeTiles {
  public:
   EdgeTiles(const sensor::Pinhole& camera, const geometry::Rigid3& camera_from_world)

@@ -49,7 +49,7 @@ Direction direction(const Vector3d& d) {
   return {std::atan2(d.y(), d.x()), std::atan2(d.z(), d.head<2>().norm())};
 }
 
-/// Direction in which a waypoint wants the camera to look at `position`, moving along `tangent`.
+/// Direction in which a waypoint makes the camera look at `position`, moving along `tangent`.
 Direction wish(const Waypoint& w, const Vector3d& position, const Vector3d& tangent) {
   Direction d = w.look ? direction(*w.look - position) : direction({tangent.x(), tangent.y(), 0.0});
   d.yaw += w.yaw_rad;

@@ -6,7 +6,7 @@
 
 namespace plumbline::synth {
 
-/// Builds the list under a scene file's `objects`; tells all problems.
+/// Builds the list under a scene file's `objects`; reports all problems.
 void read_objects(const core::ConfigNode& list, Builder& builder, core::ConfigProblems& problems);
 
 }  // namespace plumbline::synth

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Messages of ROS 2 as bytes (CDR), by CycloneDDS's reader and writer of streams, which is made for bytes
-// that nobody vouches for. Types are those of ros.idl.
+// Messages of ROS 2 as bytes (CDR), by CycloneDDS's reader and writer of streams, which accept untrusted
+// bytes. Types are those of ros.idl.
 #include "bags/messages.hpp"
 
 namespace plumbline::dataset {

@@ -16,7 +16,7 @@ namespace plumbline::dataset {
 
 struct Chunk {
   std::uint64_t plain_size = 0;  ///< of the records, not compressed
-  std::uint32_t crc = 0;         ///< of the records, not compressed; 0: not told
+  std::uint32_t crc = 0;         ///< of the records, not compressed; 0: none stored
   Compression compression = Compression::kNone;
   std::string unknown;  ///< the compression's name where it is none of these
   std::uint64_t data_at = 0;
@@ -29,8 +29,7 @@ constexpr std::uint64_t kMostChunkBytes = std::uint64_t{1} << 29;
 /// The records of a chunk, checked against its CRC; what is wrong with them otherwise.
 tl::expected<Bytes, std::string> read_chunk(const BinaryFile& file, const Chunk& chunk);
 
-/// The bytes of a chunk's records one after another; of a compressed one no more is unpacked than is asked
-/// for.
+/// The bytes of a chunk's records one after another; a compressed one is only unpacked as far as needed.
 class ChunkCursor {
  public:
   ChunkCursor(const BinaryFile& file, const Chunk& chunk);

@@ -40,7 +40,7 @@ class TemporaryFile {
   TemporaryFile(TemporaryFile&& other) noexcept;
   TemporaryFile& operator=(TemporaryFile&& other) noexcept;
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-  /// Once it has been opened by all who want it.
+  /// Removes the name; to be called once every user has opened the file.
   void take_name_away();
   /// Content of `file`, which zstd has compressed; `cut` is set if it ends early. Error (kInput, kOutput).
   static core::Result<TemporaryFile> inflated(const std::filesystem::path& file, bool& cut);
