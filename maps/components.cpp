@@ -114,7 +114,7 @@ void split_component(Map& map, KeyframeId first) {
     map.set_parent(id, is_later(id) ? first : root);
   }
 
-  // Landmarks stay with those who saw them first.
+  // Landmarks stay with the keyframes that saw them first.
   for (const KeyframeId id : all) {
     if (!is_later(id)) continue;
     const auto is_other = [&](const Observation& o) { return !is_later(o.keyframe); };

@@ -19,7 +19,7 @@ class GreyFilter : public cloud::Filter {
     table.number("share", share_, {0.0, 1.0}, "ratio", "Share of the colour to remove");
   }
 
-  /// The input is never changed; what is returned is a cloud of its own.
+  /// The input is never changed; the result is a new cloud.
   core::Result<cloud::CloudPtr> apply(const cloud::CloudConstPtr& input,
                                       const cloud::FilterContext& /*context*/) const override {
     auto output = std::make_shared<cloud::Cloud>(*input);

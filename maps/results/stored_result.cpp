@@ -97,7 +97,7 @@ cloud::DenseFusionOptions StoredResult::fusion_options() const {
   const auto root = core::parse_yaml(map_.header.configuration, file_.string());
   const core::ConfigNode* stage = root ? fuse_stage_of(*root) : nullptr;
   if (stage == nullptr) return options;
-  core::ConfigProblems ignored;  // of another version: what it does not know keeps its default
+  core::ConfigProblems ignored;  // of another version: unknown options keep their defaults
   for (const core::OptionSpec& spec : table.specs()) {
     if (const core::ConfigNode* value = stage->find(spec.key)) table.set(spec.key, *value, "fuse", ignored);
   }

@@ -59,7 +59,7 @@ core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& ma
   };
 
   const std::set<core::KeyframeId> there(keyframes->begin(), keyframes->end());
-  std::set<std::pair<std::int32_t, double>> seen;  // a run that went on may make a keyframe of what was none
+  std::set<std::pair<std::int32_t, double>> seen;  // a resumed run may make a keyframe of a stored frame
   for (const KeyframePose& keyframe : map.keyframes) {
     if (there.count(keyframe.id) == 0) continue;
     add(keyframe.id, {}, keyframe.stamp, keyframe.world_from_camera);

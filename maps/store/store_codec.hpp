@@ -160,7 +160,7 @@ template <typename Io>
 void fields(Io& io, MapRow& row) {
   io(row.keyframes, row.points, row.lines, row.edges, row.frames, row.log, row.next.edge);
   io(row.next.keyframes, row.next.points, row.next.lines, row.loops);
-  // Every id that was ever given takes four bytes of a map.
+  // Every id ever used takes four bytes of a map.
   const auto check = [&](const auto& ids) {
     for (const auto& id : ids) {
       io.check(id.index >= 0 && id.index <= 1 << 28, "a next id is out of range");

@@ -93,7 +93,7 @@ class Mirror {
     bool known = false;  ///< true: `hash` is that of the row in the file
     std::uint64_t round = 0;
   };
-  /// Leaves a tombstone for those who keep a copy.
+  /// Leaves a tombstone for copies.
   void remove(Key key) {
     erase_.bind(1, key.first).bind(2, key.second).run();
     insert_tombstone_.bind(1, key.first).bind(2, key.second).bind(3, transaction_).run();

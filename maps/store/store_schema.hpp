@@ -56,7 +56,7 @@ void put_complete(Database& database, std::int64_t transaction, bool complete);
 void put_result_frame(Database& database, std::int64_t transaction, const ResultFrame& frame);
 /// The map's own frame when none was put.
 ResultFrame read_result_frame(Database& database);
-/// Refuses what is no file, with a better message than SQLite's.
+/// Refuses a path that is not a file, with a better message than SQLite's.
 void check_file(const std::filesystem::path& file);
 
 }  // namespace plumbline::maps

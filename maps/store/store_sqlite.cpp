@@ -6,8 +6,7 @@ namespace {
 
 constexpr int kPatienceMs = 3000;
 
-/// With a mutex: clouds are read by several threads. An absolute path is never taken for a URI or for an
-/// option.
+/// With a mutex, because several threads read clouds. An absolute path is never read as a URI or an option.
 SQLite::Database opened(const std::filesystem::path& file, Database::Access access) {
   try {
     return SQLite::Database(std::filesystem::absolute(file).string(),

@@ -15,8 +15,8 @@ namespace {
 
 using core::ErrorKind;
 
-/// A write-ahead log while the run goes: a commit is one append, and what was committed survives the end of
-/// the process at any moment. Without a sync per commit, so that a power cut may take the last keyframes, but
+/// A write-ahead log during the run: a commit is one append, and committed data survive the end of the
+/// process at any moment. Without a sync per commit, so that a power cut may take the last keyframes, but
 /// never damages the file.
 void use_log(Database& database) {
   database.run("PRAGMA journal_mode = WAL");
@@ -145,7 +145,7 @@ struct StoreWriter::Impl {
 
   std::filesystem::path file;
   std::unique_ptr<Database> database;
-  std::int64_t transaction;  ///< the number of the last one, or of the one that is going on
+  std::int64_t transaction;  ///< number of the last one, or of the one under way
   Mirror maps, keyframes, states, points, lines, edges, frames, log;
   std::vector<RobotInfo> robots;  ///< as in the file
   /// Keyframes and edges were recomputed for another camera: those in the file are not kept.

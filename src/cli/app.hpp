@@ -72,11 +72,10 @@ void add_time_range(CLI::App& command, dataset::OpenOptions& open);
 void add_live_options(CLI::App& command, pipeline::MapRequest& request);
 /// --publish, for commands that make a map.
 void add_publish_option(CLI::App& command, std::string& address);
-/// Makes the one who looks on of the option's value; `names`, `name`: as
-/// open_ros2_publisher's.
+/// Makes the observer for the option's value; `names`, `name`: as for open_ros2_publisher.
 core::Result<void> prepare_publisher(Session& session, const std::string& address, net::PublishedNames names,
                                      const std::string& name, pipeline::RunRequest& request);
-/// Once they are parsed: who opens addresses, and what ends them.
+/// To be called once they are parsed: sets the function that opens addresses, and the stop token.
 void prepare_live(pipeline::MapRequest& request);
 /// --topic, for commands that read recordings, which may be bags.
 void add_topic_option(CLI::App& command, dataset::OpenOptions& open);

@@ -7,9 +7,8 @@
 
 namespace {
 
-/// Every frame takes and gives back the same images and clouds. The allocator keeps their pages instead of
-/// asking the system for zeroed ones each time; run_graph() gives back what is left over once all frames are
-/// mapped.
+/// Every frame allocates and frees the same images and clouds. The allocator keeps their pages instead of
+/// requesting zeroed ones from the system each time; run_graph() returns the rest once all frames are mapped.
 void keep_pages() {
 #ifdef __GLIBC__
   mallopt(M_MMAP_THRESHOLD, 16 << 20);

@@ -21,7 +21,7 @@ class OptionFlags {
     add_flags();
   }
 
-  /// Sets what was given on the command line; all problems at once, each naming its flag.
+  /// Applies the values given on the command line; reports all problems at once, each naming its flag.
   core::Result<void> apply();
   /// Keys of the options that were given on the command line.
   [[nodiscard]] std::set<std::string> given() const;

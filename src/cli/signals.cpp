@@ -9,7 +9,7 @@
 namespace plumbline::cli {
 namespace {
 
-// A signal handler can reach nothing but what is static.
+// A signal handler can only reach static objects.
 const core::StopToken* stop_token = nullptr;
 
 void on_signal(int signal) {

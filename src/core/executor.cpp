@@ -87,7 +87,7 @@ Executor::Job::Job(Job&&) noexcept = default;
 Executor::Job& Executor::Job::operator=(Job&& other) noexcept {
   Job taken(std::move(other));
   std::swap(state_, taken.state_);
-  return *this;  // what was there before is waited for
+  return *this;  // waits for the previous job
 }
 Executor::Job::~Job() {
   if (!state_) return;

@@ -13,7 +13,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Words that YAML 1.1 readers, many editors among them, take for booleans.
+/// Words that YAML 1.1 readers, many editors among them, read as booleans.
 Json words(const std::vector<std::string>& choices) {
   Json list = Json::array();
   for (const std::string& choice : choices) {

@@ -21,7 +21,7 @@ std::string reason() { return std::strerror(errno); }
 OutputFile::OutputFile(std::filesystem::path target) : target_(std::move(target)) {
   std::error_code error;
   std::filesystem::path real = target_;
-  if (std::filesystem::is_symlink(target_, error)) {  // the link stays, what it points to is replaced
+  if (std::filesystem::is_symlink(target_, error)) {  // keep the link and replace its target
     auto resolved = std::filesystem::weakly_canonical(target_, error);
     if (!error) real = std::move(resolved);
   }

@@ -14,7 +14,7 @@ struct ParsedNumber {
   std::string wrong;  ///< what is wrong with the value and what is allowed; "" = fine
 };
 
-/// "5 mm" in `unit`; a bare number is in `unit` already. Refuses what is outside [min, max].
+/// Converts "5 mm" to `unit`; a bare number is in `unit` already. Refuses values outside [min, max].
 ParsedNumber parse_in_range(const ConfigNode& node, double min, double max, const std::string& unit);
 
 /// Units that convert to `unit`, itself among them; "" (no unit) has none.

@@ -52,7 +52,7 @@ class AzureKinectFile {
   core::Result<cv::Mat> color(std::int64_t stamp_us);
   core::Result<cv::Mat> depth(std::int64_t stamp_us);
 
-  /// "FILE.mkv#depth@33333": the name of an image, as pairs have it in the place of a file.
+  /// "FILE.mkv#depth@33333": the name of an image, used in pairs instead of a file.
   [[nodiscard]] std::string name_of(bool depth, std::int64_t stamp_us) const;
   /// The image of such a name; none for names of another kind.
   std::optional<core::Result<cv::Mat>> read(const std::string& name);

@@ -10,7 +10,7 @@ namespace plumbline::dataset {
 namespace {
 
 constexpr std::size_t kDepthSamples = 5;
-// Structured light and time of flight measure hardly anything beyond; with millimetres taken for TUM's unit
+// Structured light and time of flight measure hardly anything beyond. If millimetres are read in TUM's unit
 // the median of a desk is still that of a room (1.3 m for 6.3 m), but its background lies far outside.
 constexpr double kSensorReach_m = 10.0;
 constexpr double kMaxShareBeyondReach = 0.1;

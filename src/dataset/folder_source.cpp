@@ -76,8 +76,8 @@ class FolderSource final : public FrameSource {
  private:
   static constexpr double kNearestPose_s = 0.02;
 
-  /// The camera that took a pair, where each has one of its own (a lens that focuses): what the recording's
-  /// turned out to be more or less than nominal, so is it.
+  /// The camera of a pair, if each has its own (a lens that focuses): corrections found for the recording's
+  /// camera are applied to it in proportion.
   [[nodiscard]] sensor::Camera camera_of(const PairInfo& pair) const {
     sensor::Camera camera = camera_;
     const sensor::Pinhole stored = layout_.frame_cameras.at(static_cast<std::size_t>(pair.camera));

@@ -46,7 +46,8 @@ core::Result<cv::Mat> read_color(const Layout& layout, const std::string& file, 
 core::Result<cv::Mat> read_depth(const Layout& layout, const std::string& file, const sensor::Pinhole& camera,
                                  double depth_scale);
 
-/// Metres of CV_32FC1 as units of 1 / depth_scale metres; what is not finite, not positive or too far is 0.
+/// Metres of CV_32FC1 as units of 1 / depth_scale metres; values that are not finite, not positive or too far
+/// become 0.
 cv::Mat depth_units(const cv::Mat& metres, double depth_scale);
 
 /// Takes out of a depth image what a mask of any size, in a file, has 0 for. Error (kInput): no mask.

@@ -21,7 +21,7 @@ bool is_jpeg(const Bytes& file);
 /// Checks every chunk's checksum and the end mark, then inflates and unfilters. Kinds of PNG that no depth
 /// camera writes (palette, interlaced, 1-4 bit) go to OpenCV after the check.
 Decoded decode_png(const Bytes& file);
-/// libjpeg with lost data taken as an error: it would otherwise fill what is missing with grey.
+/// libjpeg with lost data treated as an error: by default it would fill missing parts with grey.
 Decoded decode_jpeg(const Bytes& file);
 Decoded decode_other(const Bytes& file);
 /// NumPy's .npy: an array of two dimensions, or three of which one is 1, of float32 (CV_32FC1), float64

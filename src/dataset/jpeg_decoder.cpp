@@ -24,8 +24,9 @@ struct ErrorManager {
   std::longjmp(errors->jump, 1);
 }
 
-/// Level -1 is a warning. libjpeg goes on with invented pixels after those that mean lost data; the others
-/// (stray bytes between segments, odd version numbers) are harmless and some cameras' files are full of them.
+/// Level -1 is a warning. After a warning about lost data libjpeg continues with invented pixels; other
+/// warnings (stray bytes between segments, odd version numbers) are harmless, and frequent in some cameras'
+/// files.
 void on_message(j_common_ptr info, int level) {
   if (level >= 0) return;
   switch (info->err->msg_code) {

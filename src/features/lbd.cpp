@@ -125,7 +125,7 @@ class Sampler {
       }
       return;
     }
-    // Where the support leaves the image, the border's gradient goes on.
+    // Where the support leaves the image, the border's gradient is repeated.
     for (std::size_t k = 0; k < static_cast<std::size_t>(columns_); ++k, x += step_x_, y += step_y_) {
       out[k] =
           data_[std::clamp(y >> kFixedBits, 0, last_y_) * stride_ + std::clamp(x >> kFixedBits, 0, last_x_)];

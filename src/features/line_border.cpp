@@ -36,8 +36,7 @@ int frame_width(const Strip& strip, int max_width, int available) {
   const int limit = std::min(max_width, available / 4);
   int width = 0;
   while (width < limit && constant(strip(width))) ++width;
-  // Constant up to the limit is a dark or white scene, and without a step there is nothing to take for an
-  // edge.
+  // An image that is constant up to the limit shows a dark or white scene; without a step there is no border.
   if (width == limit || (width > 0 && !visible_step(strip(width - 1), strip(width + 1), true))) width = 0;
   // Lens rectification leaves frames that are black in the middle of a side and fade out towards its ends.
   int ragged = width;

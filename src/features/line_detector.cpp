@@ -30,7 +30,8 @@ cv::Mat detection_image(const cv::Mat& region, const LineDetectorOptions& option
                cv::INTER_AREA);
   }
   if (options.method != LineMethod::kLsd) return image;  // the others smooth by themselves
-  // Pixel noise tears regions apart: at a noise of 8 grey levels this doubles the length of what is found.
+  // Pixel noise tears regions apart: at a noise of 8 grey levels smoothing doubles the length of the detected
+  // lines.
   const double sigma = half ? kHalfScaleBlur : kFullScaleBlur;
   cv::Mat smooth;
   cv::GaussianBlur(image, smooth, cv::Size(5, 5), sigma, sigma, cv::BORDER_REPLICATE | cv::BORDER_ISOLATED);

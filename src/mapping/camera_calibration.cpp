@@ -38,7 +38,7 @@ constexpr int kLeastObservations = 300;
 
 using Parts = std::array<CalibrationProblem, kParts>;
 
-/// A picture that takes part: a keyframe, or a frame that kept what it saw.
+/// A picture that takes part: a keyframe, or a frame with stored observations.
 struct View {
   double stamp = 0.0;
   Rigid3 camera_from_world;
@@ -285,7 +285,7 @@ class Calibrator {
     }
     result.gain = 1.0 - best.cost() / before.cost();
     const CameraChange change = most_likely(evidence, believed, prior_);
-    for (const Group& group : groups()) {  // those found first, with what was found after them
+    for (const Group& group : groups()) {  // report the final values of all
       if (believed[group.front()]) note(group, change, best.sigma(), {}, true, result.findings);
     }
     return change;

@@ -26,8 +26,8 @@ void SlamOptions::declare(core::OptionTable& table) {
       "When the camera stays lost, go on in a second map and join the two where they show the same place");
 }
 
-/// Frames after which what was measured beside the tracker goes into the map: a keyframe's work is spread
-/// over several frames, and its surfaces are aligned meanwhile.
+/// Frames after which background measurements go into the map: a keyframe's work is spread over several
+/// frames, and its surfaces are aligned meanwhile.
 constexpr std::int64_t kConnectAfter = 2;
 
 /// Frames in a row that are lost before a new component begins: half a second of a common camera.
@@ -233,7 +233,7 @@ void Slam::begin_component(const sensor::RgbdFrame& frame, const Features& featu
 }
 
 void Slam::insert_keyframe(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report) {
-  // Section 3.3: observations and new landmarks, doubles merged, bad ones culled.
+  // Section 3.3: observations and new landmarks, duplicates merged, bad ones culled.
   const core::KeyframeId id = mapper_.insert(map_, frame, last_track_, features->levels);
   NewKeyframe made{id, frame_count_,
                    mapper_.begin_surface_edges(map_, id, frame.depth, last_track_, tracker_.photometric(),
@@ -307,8 +307,8 @@ void Slam::connect_keyframes() {
   while (!new_keyframes_.empty()) connect_keyframe(ignored);
 }
 
-/// The whole map may move: what was taken from it before must be back. The tracker waits, so that the next
-/// frame is tracked against the map as it is then, whatever the clock says.
+/// The whole map may move, so everything that was taken from it before must be back. The tracker waits, so
+/// that the next frame is tracked in the new map, independent of the clock.
 void Slam::close_loops(core::KeyframeId keyframe) {
   if (!options_.loops.enabled) return;
   const std::size_t disputes = closer_.disputes().size();
@@ -376,7 +376,7 @@ void Slam::join_components(core::KeyframeId keyframe) {
   map.set_parent(overlap->b, query_in_a ? best->query : best->match);
   if (!closer_.close(map, edges)) return;
 
-  // The tracker goes on where it was beside its keyframe.
+  // The tracker continues at the same pose relative to its keyframe.
   const core::KeyframeId reference = tracker_.reference();
   const Rigid3 camera_from_reference =
       tracker_.camera_from_world() * map_.camera_from_world(reference).inverse();

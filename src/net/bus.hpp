@@ -22,7 +22,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::uint32_t kProtocol = 3;
 
-/// A robot's identity and what its store holds. messages.idl documents the fields.
+/// A robot's identity and the content of its store. messages.idl documents the fields.
 struct RobotStatus {
   std::uint32_t protocol = kProtocol;
   std::uint32_t store_format = 0;
@@ -54,7 +54,7 @@ struct SharedFrame {
   std::array<double, 21> covariance{};
 };
 
-/// The hub's identity and what it holds of one robot.
+/// The hub's identity and its content of one robot's store.
 struct HubStatus {
   std::uint32_t protocol = kProtocol;
   std::uint32_t store_format = 0;

@@ -70,7 +70,7 @@ class Gate {
     o.outlier = beyond(squared, point_gate_, o.pixel_sigma);
     return squared;
   }
-  /// A line through the camera's centre has no image: it cannot be what was seen there.
+  /// A line through the camera's centre has no image, so the observation cannot be of it.
   double mark(BundleLineObservation& o) const {
     LineTerm term;
     term.world = lines_[static_cast<std::size_t>(o.line)];
@@ -88,7 +88,7 @@ class Gate {
  private:
   using Rigid3 = geometry::Rigid3;
   static constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  /// Also what is no number.
+  /// True beyond the gate, and if it is not a number.
   [[nodiscard]] bool beyond(double squared, double gate, double pixel_sigma) const {
     return !(squared <= std::max(gate, least_px2_ / (pixel_sigma * pixel_sigma)));
   }
@@ -112,7 +112,7 @@ BundleFit fit_of_edges(const BundleProblem& problem, const BundleState& state) {
   return sum.fit(6);
 }
 
-/// Puts what is beyond the gates aside. Tells how well all fits, by the gates of the options.
+/// Marks observations beyond the gates as outliers. Returns the fits by the gates of the options.
 BundleFits mark_outliers(BundleProblem& problem, const BundleState& state, const BundleOptions& options,
                          double point_gate, double line_gate, double least_px) {
   const Gate gate(state, problem.camera, point_gate, line_gate, least_px);

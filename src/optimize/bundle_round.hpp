@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The inside of bundle_solver: what is seen by whom (bundle_round.cpp), the normal equations
+// Internals of bundle_solver: observations by pose and landmark (bundle_round.cpp), the normal equations
 // (bundle_normal.cpp), elimination of landmarks (bundle_schur.cpp), steps (bundle_solver.cpp).
 #include <algorithm>
 #include <cmath>
@@ -41,7 +41,7 @@ class TrustRegion {
   explicit TrustRegion(double radius) : radius_(radius) {}
   [[nodiscard]] double radius() const { return radius_; }
   [[nodiscard]] bool exhausted() const { return radius_ < 1e-32; }
-  /// `gain`: of the cost, as a share of what was promised.
+  /// `gain`: actual reduction of the cost, as a share of the predicted one.
   void accept(double gain);
   void reject();
 

@@ -86,7 +86,7 @@ std::vector<Matrix6d> BundleRound::covariances(const BundleState& state) {
 const char* BundleRound::iterate(TrustRegion& region, BundleState& state, BundleState& next,
                                  RoundSummary& summary) {
   constexpr double kGradientTolerance = 1e-10;
-  constexpr double kLeastGain = 1e-3;  // share of what was promised that a step must bring
+  constexpr double kLeastGain = 1e-3;  // smallest gain of a step, relative to its predicted gain
   if (equations_.largest_gradient() <= kGradientTolerance) return "the gradient is zero";
   if (region.exhausted()) return "no step lowers the cost";
 

@@ -2,8 +2,8 @@
 #pragma once
 
 // One round of bundle adjustment: Levenberg-Marquardt on poses, points and lines. Landmarks are eliminated
-// first; what is left couples poses that share some (Triggs et al., Bundle Adjustment: A Modern Synthesis,
-// 2000). By a solver of our own, which is the faster one while the poses are few (a window beside the
+// first; the remaining system couples poses that share some (Triggs et al., Bundle Adjustment: A Modern
+// Synthesis, 2000). Solved by our own solver, which is faster if there are few poses (a window beside the
 // tracker), or by Ceres. Trust region, damping, losses and ends of iterations mean the same in both.
 #include <string>
 #include <vector>
@@ -43,9 +43,9 @@ struct UsedObservations {
   std::vector<int> lines;
 };
 
-/// From the world (a = -1) to each pose that edges hold, with 1 m and 1 rad: far weaker than anything
-/// measured, but directions that an edge leaves free would otherwise run off (damping scales each unknown by
-/// what is known of it, and so prefers to move along them).
+/// Edges from the world (a = -1) to each pose that edges hold, with 1 m and 1 rad: far weaker than any
+/// measurement, but directions that an edge leaves free would otherwise run off (damping scales each unknown
+/// by its information, and so prefers to move along them).
 std::vector<BundleEdge> holding_edges(const BundleProblem& problem, const BundleState& state);
 
 }  // namespace plumbline::optimize

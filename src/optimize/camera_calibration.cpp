@@ -294,7 +294,7 @@ std::optional<CameraEvidence> camera_evidence(CalibrationProblem& problem, const
   options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
 
   ceres::HuberLoss pixel_loss(1.0);
-  ceres::CauchyLoss depth_loss(1.5);  // corners at the rim of things have the depth of what is behind
+  ceres::CauchyLoss depth_loss(1.5);  // corners at the rim of things have the depth of the background
   ceres::Problem ceres_problem(options);
   add_observations(problem, unknowns, &pixel_loss, &depth_loss, ceres_problem);
   if (!adjust(problem, unknowns, ceres_problem)) return std::nullopt;

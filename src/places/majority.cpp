@@ -129,7 +129,8 @@ Clusters k_majority(const std::vector<Descriptor256>& descriptors, int k, int it
     if (clusters.centres == before) break;
   }
 
-  // The last assignment may leave a moved centre idle: it goes, and what is left is assigned again.
+  // After the last assignment a moved centre may have no members: it is dropped, and its neighbours are
+  // assigned again.
   for (;;) {
     clusters.member_of = assign(clusters.centres, descriptors.size(), distances);
     std::vector<BitCounter> counters(clusters.centres.size());

@@ -55,7 +55,7 @@ struct DepthPatch {
   void paint(cv::Mat& out) const;
 };
 
-/// Into a depth image whose 0 is nothing; what is nearer stays.
+/// Paints into a depth image in which 0 is empty; nearer pixels are kept.
 void DepthPatch::paint(cv::Mat& out) const {
   // clamped before the cast: a point far outside must not overflow an int
   const int u0 = static_cast<int>(std::ceil(std::clamp(centre.x() - half.x(), 0.0, out.cols + 0.0)));
@@ -122,7 +122,7 @@ struct Rectifier::Maps {
     if (!(camera.color_from_depth && camera.depth)) fill_nearest(x, y);
   }
 
-  /// Positions in the lens's image of what is at each pixel of the target.
+  /// Positions in the lens's image of each pixel of the target.
   void source_pixels(cv::Mat& x, cv::Mat& y) const {
     const auto matrix = [](const Pinhole& p) { return cv::Matx33d(p.fx, 0, p.cx, 0, p.fy, p.cy, 0, 0, 1); };
     const cv::Size size(target.width, target.height);

@@ -57,8 +57,8 @@ void FrameAligner::judge() {
   result_.min_eigenvalue = directions.eigenvalues(0);
   const double limit = degenerate_below(information, uses_features() && !by_features);
   result_.degenerate_directions = static_cast<int>((directions.eigenvalues.array() < limit).count());
-  // Far corners or one wall leave a direction to the motion model. It may hold that for a while, when what is
-  // seen is no chance find.
+  // Far corners or one wall leave a direction to the motion model. It may hold that for a while, if the
+  // matches are not mere chance.
   const bool many = feature_inliers() >= 3 * in_.options.min_inliers && result_.min_eigenvalue >= kBlind;
   // A direction that falls short by a little is no chance find yet, though some of the surface does not fit.
   const bool nearly = result_.min_eigenvalue >= kNearlyHeld * limit;

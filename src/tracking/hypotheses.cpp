@@ -68,7 +68,7 @@ Tracker::PoseHypotheses Tracker::pose_hypotheses(const maps::Map& map, const sen
 void Tracker::rank_by_intensity(const maps::Map& map, const PhotometricView& view,
                                 PoseHypotheses& hypotheses) const {
   constexpr std::size_t kCoarse = 1;
-  constexpr double kSure = 0.3;  // correlation of what is searched for
+  constexpr double kSure = 0.3;  // smallest correlation of a shifted pose
   std::vector<Rigid3>& poses = hypotheses.camera_from_world;
   std::vector<std::optional<double>> agreement;
   std::vector<std::optional<optimize::PhotometricFamily>> families;
@@ -112,7 +112,7 @@ bool Tracker::jumps(double stamp, const Rigid3& camera_from_world) const {
 std::optional<TrackResult> Tracker::track_with_motion_model(const maps::Map& map,
                                                             const sensor::RgbdFrame& frame,
                                                             const features::FrameFeatures& features) const {
-  constexpr double kClearly = 1.15;  // more must bear a jump out than what is near the hypothesis
+  constexpr double kClearly = 1.15;  // a jump needs this much more support than the pose near by
   if (motion_.expired()) return std::nullopt;
   const PoseHypotheses hypotheses = pose_hypotheses(map, frame, features);
   const auto tracked = [&](const TrackResult& attempt) {

@@ -23,7 +23,7 @@ void append_unique(std::vector<KeyframeId>& list, KeyframeId id) {
   if (std::find(list.begin(), list.end(), id) == list.end()) list.push_back(id);
 }
 
-/// Which voxel and which way a sample faces: what is fused must lie close together and face the same way.
+/// Key of a sample's voxel and direction: fused samples must lie close together and face the same way.
 std::uint64_t voxel_of(const WorldSurface& s, double voxel_m) {
   return cloud::pack_cell(cloud::cell_of(s.point / voxel_m)) << 3 |
          static_cast<std::uint64_t>(cloud::facing(s.normal));

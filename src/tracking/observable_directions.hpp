@@ -10,8 +10,8 @@
 
 namespace plumbline::tracking {
 
-/// Principal directions of the information, rotations counted in units that move the scene as much as a metre
-/// of translation does, at 2 m.
+/// Principal directions of the information; rotations are in units that move the scene as much as a metre of
+/// translation does, at 2 m.
 struct PrincipalDirections {
   geometry::Vector6d eigenvalues;  ///< ascending
   geometry::Matrix6d eigenvectors;
@@ -19,9 +19,9 @@ struct PrincipalDirections {
 
 PrincipalDirections principal_directions(const geometry::Matrix6d& information);
 
-/// Information below which a direction is degenerate. Where surfaces are alone, the noise of their normals
-/// seems to hold what it does not: a direction needs its share of the normals. (Without features by choice
-/// there is nothing better to go by.)
+/// Information below which a direction is degenerate. With surfaces alone, the noise of their normals seems
+/// to hold directions that it does not: a direction then needs its share of the normals. (If features are
+/// switched off there is no better criterion.)
 double degenerate_below(const geometry::Matrix6d& information, bool surface_only);
 
 /// Takes a motion (left perturbation of camera_from_world) to its part in the directions with less

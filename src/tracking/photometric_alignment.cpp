@@ -164,7 +164,7 @@ std::optional<optimize::PhotometricFamily> photometric_in_view(const features::P
 }
 
 bool update_photometric(optimize::PhotometricFamily& family, const Rigid3& camera_from_world) {
-  family.gain = 0.0;  // residuals are what is seen, in grey values
+  family.gain = 0.0;  // residuals are the observed grey values
   family.sigma = 1.0;
   for (optimize::PhotometricTerm& term : family.terms) term.weight = 1.0F;
   const std::vector<float> seen = optimize::photometric_residuals(family, camera_from_world);

@@ -138,7 +138,7 @@ std::vector<SurfaceCandidate> candidates(const HalfDepth& depth, const sensor::P
       c.sample.normal = dv.cross(du).normalized();  // x right, y down: towards the camera
       const float cosine = -c.sample.normal.dot(c.sample.point.normalized());
       if (!(cosine > min_cosine)) continue;
-      // Smoothing leaves part of the noise; what is left acts along the ray.
+      // Smoothing leaves part of the noise, which acts along the ray.
       c.sample.sigma =
           0.5F * static_cast<float>(sensor::depth_sigma(z)) * std::max(0.3F, -c.sample.normal.z());
       c.cell = (y * kCellsY / depth.height) * kCellsX + x * kCellsX / depth.width;

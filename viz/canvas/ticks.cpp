@@ -20,7 +20,7 @@ std::vector<Tick> nice_ticks(double low, double high, double wish) {
   std::vector<Tick> ticks;
   const double span = high - low;
   if (!(span > 0.0) || !std::isfinite(span) || !(wish > 0.0)) return ticks;
-  // The step nearest to the wish rather than the one below it, which may give twice as many.
+  // The step nearest to the requested one rather than the one below it, which may give twice as many.
   const double step = nice_number_below(1.5 * wish);
   constexpr double kMostSteps = 1e12;  // from zero: beyond, neighbouring ticks are soon the same number
   if (std::max(std::abs(low), std::abs(high)) > kMostSteps * step) return ticks;

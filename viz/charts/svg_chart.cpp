@@ -44,7 +44,7 @@ void widen(AxisRange& range, double factor) {
   range = {middle - half, middle + half};
 }
 
-/// The rectangle inside the axes, and what it shows.
+/// The rectangle inside the axes, and its content.
 struct Plot {
   double width = 1.0;
   double height = 1.0;

@@ -213,7 +213,7 @@ void add_colored_path(const TrajectoryComparison& comparison, const std::vector<
         fmt::format("up to {:.1f} {}", unit.per_metre * most, unit.name), fmt::format("e{}", k), {}, {}};
 
     for (std::size_t i = 0; i < x.size(); ++i) {
-      // A class goes on to the first point of the next one.
+      // The curve of a class continues to the first point of the next one.
       const bool goes_on = i > 0 && !gaps[i] && class_of(i - 1) == k;
       if (!goes_on && class_of(i) != k) continue;
       if (!goes_on) {

@@ -12,10 +12,9 @@
 
 namespace plumbline::report {
 
-/// `pattern` with the values of `json` in the place of its fields: "{/verified} of {/tried}". A field is a
-/// JSON pointer, with a format after a colon if it is no count: decimals and unit ("2 σ"), or "text". Units
-/// mm, deg and % are converted from metres, radians and shares; without the blank ("1mm") the unit is left
-/// out.
+/// `pattern` with the values of `json` in its fields: "{/verified} of {/tried}". A field is a JSON pointer,
+/// with a format after a colon unless it is a count: decimals and unit ("2 σ"), or "text". Units mm, deg and
+/// % are converted from metres, radians and shares; without the blank ("1mm") the unit is left out.
 std::string filled(const nlohmann::ordered_json& json, const std::string& pattern);
 
 /// Facts by label and pattern.
@@ -27,7 +26,7 @@ class JsonTable {
  public:
   /// Heads as HtmlTable has them, and the patterns of their cells.
   explicit JsonTable(const std::vector<std::pair<const char*, const char*>>& columns);
-  /// `cells`: texts of the first columns, in the place of their patterns.
+  /// `cells`: texts of the first columns, instead of their patterns.
   void row(const nlohmann::ordered_json& json, std::vector<std::string> cells = {},
            const std::string& kind = {});
   [[nodiscard]] std::size_t rows() const { return table_.rows(); }

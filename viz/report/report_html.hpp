@@ -12,7 +12,7 @@
 
 namespace plumbline::report {
 
-/// "1 519 937"; a dash for what is not known (NaN), as all of these.
+/// "1 519 937"; like all of these, a dash if not known (NaN).
 std::string count_text(double count);
 /// With its unit: "12.3 ms".
 std::string number_text(double value, int decimals, std::string_view unit = {});

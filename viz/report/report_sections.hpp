@@ -10,7 +10,7 @@
 
 namespace plumbline::report {
 
-/// Verdict, key figures, what speaks against the result, input and settings.
+/// Verdict, key figures, doubts about the result, input and settings.
 std::string head_html(const ReportData& data);
 /// The folder's snapshots; where it has none, drawn now. `scratch`: where a picture may be put meanwhile.
 core::Result<std::string> pictures_html(ReportData& data, const std::filesystem::path& scratch);

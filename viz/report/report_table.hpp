@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Files of a result read back: tables (frames.csv and timing.csv), and what is said of their columns.
+// Tables of a result read back (frames.csv and timing.csv), with descriptions of their columns.
 #include <filesystem>
 #include <string>
 #include <string_view>

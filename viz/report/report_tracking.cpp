@@ -198,7 +198,7 @@ class RobotCharts {
 
 }  // namespace
 
-/// Maps that were begun when tracking was lost, and what became of them; empty: there was none.
+/// Maps that were begun when tracking was lost, with their outcome; empty: there was none.
 static std::string components_html(const ReportData& data) {
   const auto& list = list_at(data.summary, "/components/list");
   JsonTable table({{"map", "{/name:text}"},

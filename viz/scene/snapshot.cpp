@@ -307,7 +307,7 @@ class Renderer {
 
 }  // namespace
 
-/// Only this thread draws. What is to be drawn is chosen, and what is drawn is written, beside it.
+/// Only this thread draws; selecting data and writing pictures run beside it.
 core::Result<void> render_snapshots(const Scene& scene, const std::vector<Snapshot>& snapshots,
                                     const core::Executor& executor) {
   for (const Snapshot& snapshot : snapshots) {

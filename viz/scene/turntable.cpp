@@ -19,7 +19,7 @@ namespace {
 constexpr double kPitch = 35.0 * M_PI / 180.0;
 constexpr double kFieldOfView_deg = 28.0;
 
-/// The middle of what is to be seen and how far it reaches from there, a few specks left out.
+/// Centre and radius of the visible scene, a few outliers left out.
 struct SceneExtent {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double radius_m = 1.0;

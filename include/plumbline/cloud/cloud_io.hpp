@@ -18,7 +18,7 @@ namespace plumbline::cloud {
 struct CloudColumns {
   std::vector<float> confidence;            ///< 0-1, see VoxelMap
   std::vector<std::uint32_t> observations;  ///< views that saw the point
-  std::vector<std::uint8_t> robot;          ///< who saw it
+  std::vector<std::uint8_t> robot;          ///< number of the robot that saw the point most
 
   /// A column of another program, by its name in the file ("intensity").
   struct Other {

@@ -28,8 +28,8 @@ struct PlaneStep {
 
 /// For pcl::IterativeClosestPoint::setTransformationEstimation. Residuals lie along the mean of both normals,
 /// weighted with both standard deviations (curvature), under a robust loss whose scale is the median
-/// residual: Huber while the surfaces are apart (`narrow` false), so that the few points that show it are
-/// heard, then Tukey.
+/// residual: Huber while the surfaces are apart (`narrow` false), so that the few points that show the offset
+/// have weight, then Tukey.
 class ConstrainedPointToPlane
     : public pcl::registration::TransformationEstimation<SurfacePoint, SurfacePoint, double> {
  public:
@@ -37,7 +37,7 @@ class ConstrainedPointToPlane
   explicit ConstrainedPointToPlane(double min_information) : min_information_(min_information) {}
   void setNarrow(bool narrow) { narrow_ = narrow; }
 
-  /// The step from the source to the target, and what is known of it.
+  /// The step from the source to the target, with its information.
   [[nodiscard]] PlaneStep step(const SurfaceCloud& source, const SurfaceCloud& target,
                                const pcl::Correspondences& correspondences) const;
 

@@ -3,9 +3,10 @@
 
 // The views of a whole run as one cloud with thin, single walls.
 //
-// Views are laid down in a voxel map tile by tile, so that memory follows the tile and not the run; within a
-// tile the points of flat pieces of surface come to lie on their common plane (surfels.hpp), what other views
-// look through is removed (free_space.hpp), and colours are evened out between views (exposure.hpp).
+// Views are fused in a voxel map tile by tile, so that memory depends on the tile and not on the run; within
+// a tile the points of flat pieces of surface are projected onto their common plane (surfels.hpp), points
+// that other views look through are removed (free_space.hpp), and colours are balanced between views
+// (exposure.hpp).
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -60,10 +61,10 @@ struct FusionViews {
 };
 
 /// Fuses the views. Reads each once to plan and once for all tiles that are filled together. Points come tile
-/// by tile, in a fixed order; the same for any number of threads. Of several robots, columns.robot tells who
-/// measured each point most. The column kSigmaColumn holds the noise of the poses, as if all views of a place
-/// erred alike, and that of depth, as if it averaged over views but not within one. Errors are those of
-/// `read`. `report` may be null.
+/// by tile, in a fixed order; the same for any number of threads. For several robots, columns.robot is the
+/// one that measured each point most. The column kSigmaColumn holds the noise of the poses, as if all views
+/// of a place erred alike, and that of depth, as if it averaged over views but not within one. Errors are
+/// those of `read`. `report` may be null.
 core::Result<FusedCloud> fuse_views(const FusionViews& views, const DenseFusionOptions& options,
                                     const core::Executor& executor, FusionReport* report = nullptr);
 

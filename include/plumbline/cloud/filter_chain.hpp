@@ -57,11 +57,11 @@ class FilterChain {
   /// The files that its filters write (tee), in their order.
   [[nodiscard]] std::vector<std::string> writes() const;
 
-  /// Runs the chain when it is ready; an empty chain gives a copy. Errors name chain, place and filter. Every
-  /// filter's input is let go once it is used: who moves `input` in never pays for more than two clouds.
-  /// Columns: `context.columns` are those of the input, `context.made_columns` gets those of the result.
-  /// `reports` (may be null) gets one entry per filter run; `progress` is called before each filter and at
-  /// the end.
+  /// Runs the chain when it is ready; an empty chain gives a copy. Errors name chain, position and filter.
+  /// Every filter's input is released once it is used: if `input` is moved in, no more than two clouds exist
+  /// at a time. Columns: `context.columns` are those of the input, `context.made_columns` gets those of the
+  /// result. `reports` (may be null) gets one entry per filter run; `progress` is called before each filter
+  /// and at the end.
   core::Result<CloudPtr> apply(CloudConstPtr input, const FilterContext& context = {},
                                std::vector<FilterReport>* reports = nullptr,
                                const ChainProgress& progress = {}) const;

@@ -54,12 +54,12 @@ class DepthLimits {
   std::vector<std::uint16_t> nearest_, furthest_;  ///< millimetres, 0: none
 };
 
-/// `is_depth_view`: by view; depth views are tested only where clouds alone do not let a surfel go: some
-/// cloud looks through, or fewer than four see a surface. For every surfel whether it is to go: at least half
-/// as many views look through it as see a surface there, two at least unless no more than one view sees it.
-/// Who walks towards the camera hides the place that he comes from: surfels that some view looks through, or
-/// that three times as many views cannot see as see them (three at least), go too where at least half of what
-/// is certain within 10 cm goes.
+/// For every surfel whether it must be removed: if at least half as many views look through it as see a
+/// surface there, and at least two unless only one view sees it. A person walking towards the camera hides
+/// the place behind: surfels that some view looks through, or that three times as many views cannot see as
+/// see them (three at least), are removed too if at least half of the certain surfels within 10 cm are.
+/// `is_depth_view`: by view; depth views are tested only for surfels that clouds alone do not decide: some
+/// cloud looks through, or fewer than four see a surface.
 std::vector<std::uint8_t> seen_through(const Surfels& surfels, const std::vector<DepthRaster>& rasters,
                                        const std::vector<std::uint8_t>& is_depth_view,
                                        const std::vector<geometry::Rigid3>& world_from_camera);

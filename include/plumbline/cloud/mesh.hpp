@@ -18,10 +18,10 @@ struct MeshOptions {
   void declare(core::OptionTable& table);
 };
 
-/// Poisson surface reconstruction (Kazhdan et al., SGP 2006; PCL's) of the points with normals; what it
-/// closes where nothing was seen is cut off again. Vertices have x y z, nx ny nz, red green blue. Same cloud,
-/// same mesh. Errors (kUsage): fewer than 100 points with normals; an extent that `resolution_m` cuts into
-/// more than 2^12 cells a side, with the resolution that would do.
+/// Poisson surface reconstruction (Kazhdan et al., SGP 2006; PCL's) of the points with normals; surface that
+/// it adds where nothing was seen is cut off again. Vertices have x y z, nx ny nz, red green blue. Same
+/// cloud, same mesh. Errors (kUsage): fewer than 100 points with normals; an extent that `resolution_m` cuts
+/// into more than 2^12 cells a side, with the resolution that is possible.
 core::Result<PlyData> make_mesh(const Cloud& cloud, const MeshOptions& options = {});
 
 /// .ply, or .obj: Wavefront text with colours behind the coordinates, as MeshLab and Blender read them.

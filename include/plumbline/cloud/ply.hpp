@@ -30,7 +30,8 @@ struct PlyData {
   std::vector<std::array<std::uint32_t, 2>> edges;
   std::vector<std::array<std::uint8_t, 3>> edge_colors;  ///< red, green, blue; empty or one per edge
   std::vector<std::string> comments;
-  /// Added to the columns x, y and z: what read_ply took off them, or what write_ply is to add, as doubles.
+  /// Added to the columns x, y and z, as doubles: the shift that read_ply subtracted, or that write_ply must
+  /// add.
   std::array<double, 3> shift{};
 
   /// The column as floats or bytes; nullptr when there is none of this name and type.

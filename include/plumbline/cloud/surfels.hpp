@@ -71,7 +71,7 @@ class Surfels {
   /// Visits the surfels of a block, from its first one on, that face like `normal`.
   template <typename Visit>
   void visit_alike(std::uint32_t first, const Eigen::Vector3f& normal, const Visit& visit) const;
-  /// Over the surfel and what is around it.
+  /// Fits a plane to the surfel and its surroundings.
   void fit_plane(Surfel& surfel) const;
   /// Plane of a weighted set of points; false when there are too few.
   static bool set_plane(const Surfel& sums, Surfel& surfel);

@@ -28,7 +28,7 @@ struct VoxelMapOptions {
   void declare(core::OptionTable& table);
 };
 
-/// A fused point and what is known of it.
+/// A fused point and its statistics.
 struct FusedPoint {
   Point point;
   float weight = 0.0F;             ///< sum over the measurements, see VoxelMap
@@ -49,7 +49,7 @@ struct FusedCloud {
 /// Puts points behind those of `cloud`.
 void append(const std::vector<FusedPoint>& points, bool robots, FusedCloud& cloud);
 
-/// Weighted means of what was measured of one side of a voxel, by one view or by many: a cache line.
+/// Weighted means of the measurements of one side of a voxel, by one view or by many: a cache line.
 struct VoxelSide {
   Eigen::Vector3f mean{0, 0, 0};    ///< metres from the voxel's centre
   Eigen::Vector3f normal{0, 0, 0};  ///< weighted sum; while none is known, of directions to the camera

@@ -179,7 +179,7 @@ class ByteReader : public Archive<ByteReader> {
   void planes(T* values, std::size_t n) {
     planes<sizeof(T)>(values, n);
   }
-  /// One by one: what is promised and not there takes no memory.
+  /// Reads elements one by one: a length that exceeds the data takes no memory.
   template <typename List>
   void list(List& things) {
     things.clear();

@@ -23,9 +23,9 @@ class Executor {
   /// Calls body(i) for i in [0, count), in any order; returns when all are done. Rethrows what body throws.
   void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body) const;
 
-  /// Work that runs beside the caller. Destroying a Job waits for it. Whoever waits for work that has not
-  /// begun does it on the spot, and otherwise takes up nothing else meanwhile: a wait is never longer than
-  /// the work, and one thread suffices. The work itself must not wait for other jobs.
+  /// Work that runs beside the caller. Destroying a Job waits for it. wait() runs the job itself if it has
+  /// not started, and never runs other jobs meanwhile, so it cannot take longer than the job and works with
+  /// one thread. The work itself must not wait for other jobs.
   class Job {
    public:
     Job();

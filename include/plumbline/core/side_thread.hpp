@@ -8,7 +8,7 @@
 
 namespace plumbline::core {
 
-/// A thread that works until this object is destroyed. Declare it as the last member, after what it uses.
+/// A thread that works until this object is destroyed. Declare it as the last member, after all that it uses.
 class SideThread {
  public:
   explicit SideThread(const std::function<void(const StopToken&)>& work)

@@ -14,8 +14,8 @@ namespace plumbline::dataset {
 /// is not laid out as a recording of another kind.
 bool is_bag(const std::filesystem::path& path);
 
-/// A few lines: kind, one for each topic (type, how many messages, a second, from when to when), what is
-/// damaged, and which topics would be mapped and why. Error (kInput): nothing can be read.
+/// A few lines: kind, one line per topic (type, message count and rate, first and last time), damage, and the
+/// topics that would be mapped with the reasons. Error (kInput): nothing can be read.
 core::Result<std::string> bag_to_text(const std::filesystem::path& path, const TopicNames& named);
 
 }  // namespace plumbline::dataset

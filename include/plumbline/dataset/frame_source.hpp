@@ -70,8 +70,8 @@ class FrameSource {
   [[nodiscard]] virtual core::Result<StoredPair> stored(std::size_t /*index*/) const {
     return core::input_error(name() + ": has no stored images");
   }
-  /// The same frames as taken by `better` in the place of camera(), rectified into images of camera().color
-  /// all the same; null when the source cannot.
+  /// The same frames as taken by `better` instead of camera(), but still rectified into images of
+  /// camera().color; null if the source cannot do that.
   [[nodiscard]] virtual std::unique_ptr<FrameSource> taken_by(const sensor::Camera& /*better*/) const {
     return nullptr;
   }
@@ -93,7 +93,7 @@ class FrameSource {
   }
   /// For a live source: true if the result is not needed any more.
   [[nodiscard]] virtual bool given_up() const { return false; }
-  /// For a live source: ends it and what it writes itself. Error (kOutput): the record.
+  /// For a live source: ends it and the files that it writes itself. Error (kOutput): the record.
   [[nodiscard]] virtual core::Result<void> finish() const { return {}; }
   /// Report of a live source that has ended.
   [[nodiscard]] virtual LiveReport report() const { return {}; }

@@ -42,11 +42,11 @@ class MessageStream {
 };
 
 enum class Retention {
-  kPassing,  ///< for who listens now
-  kLatest,   ///< who comes later gets the latest one, too
+  kPassing,  ///< for present subscribers
+  kLatest,   ///< late subscribers get the latest one, too
 };
 
-/// Somebody who takes messages. Used by one thread at a time.
+/// Receiver of messages. Used by one thread at a time.
 class MessageSink {
  public:
   virtual ~MessageSink() = default;
@@ -58,7 +58,7 @@ class MessageSink {
   virtual core::Result<void> send(const std::string& topic, const std::vector<std::uint8_t>& bytes) = 0;
   /// Number of current listeners to the topic.
   virtual std::size_t listeners(const std::string& topic) = 0;
-  /// Waits until listeners have what was sent, at most so long.
+  /// Waits until subscribers have all sent messages, at most this long.
   virtual void flush(std::chrono::milliseconds most) = 0;
 };
 

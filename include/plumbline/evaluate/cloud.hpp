@@ -37,7 +37,7 @@ enum class SampleDistance {
 struct CloudOptions {
   CloudAlignment align = CloudAlignment::kNone;
   SampleDistance distance = SampleDistance::kSurface;
-  bool visible_only = true;  ///< if the reference says what was visible, only that counts for completeness
+  bool visible_only = true;         ///< completeness counts only visible samples, if the reference marks them
   double mesh_spacing_m = 0.01;     ///< a mesh is sampled this densely for completeness
   double icp_max_distance_m = 0.3;  ///< farthest pairs ICP starts with
   double icp_trim = 0.8;            ///< share of the pairs ICP keeps, the nearest ones

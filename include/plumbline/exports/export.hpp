@@ -48,7 +48,7 @@ struct ExportRequest {
 struct ExportSummary {
   std::string format;                          ///< its name
   std::vector<std::filesystem::path> written;  ///< files, or one folder
-  std::vector<std::string> notes;              ///< whole sentences: what is missing, what was found
+  std::vector<std::string> notes;              ///< whole sentences on missing parts and on findings
 };
 
 /// Tells how far the work is.
@@ -69,7 +69,7 @@ struct FormatInfo {
   std::string content;               ///< "cloud", "mesh", ...: distinguishes formats with the same ending
   std::string needs;                 ///< "cloud", "map.db", "map.db, recording"
   std::string title;                 ///< one line
-  std::string description;           ///< Markdown: what is right about it and what to do with it
+  std::string description;           ///< Markdown: the format's conventions and its use
   std::vector<std::string> options;  ///< keys of ExportOptions
 };
 std::vector<FormatInfo> export_formats();

@@ -15,7 +15,7 @@ inline constexpr const char* kViewGenerator = "plumbline view";
 
 struct MapView {
   viewer::Scene scene;
-  std::vector<std::string> notes;  ///< whole sentences: what is missing of the scene, and why
+  std::vector<std::string> notes;  ///< whole sentences on missing parts of the scene, with reasons
 };
 
 /// All that the map has to show: cloud with its layers, paths, keyframes with small pictures where the

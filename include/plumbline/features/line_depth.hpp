@@ -51,8 +51,8 @@ struct LineDepthOptions {
 };
 
 /// 3D line of `segment` from `depth_m` (CV_32FC1, metres along z, 0 or NaN = none, same pinhole as the
-/// segment). At a depth jump the foreground side is taken, since an occluding edge belongs to what is in
-/// front. None when depth does not support one 3D line. Deterministic: the same input gives the same bytes.
+/// segment). At a depth jump the foreground side is taken, since an occluding edge belongs to the foreground.
+/// None if depth does not support one 3D line. Deterministic: the same input gives the same bytes.
 std::optional<Line3> fit_line_depth(const LineSegment& segment, const cv::Mat& depth_m,
                                     const sensor::Pinhole& camera, const LineDepthOptions& options = {});
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Images for direct alignment: what is left of the grey values once everything wider than a few pixels is
-// taken away (exposure, vignetting, shading), and where on the surfaces it was seen. A painted wall has no
-// corners, but thousands of pixels of faint grain, which together hold a camera to a fraction of a pixel.
+// Images for direct alignment: grey values without anything wider than a few pixels (exposure, vignetting,
+// shading), and the surface points where they were seen. A painted wall has no corners, but thousands of
+// pixels of faint texture, which together hold a camera to a fraction of a pixel.
 #include <array>
 #include <opencv2/core/mat.hpp>
 #include <vector>

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Rolling shutters read an image out row by row, over some 20 ms; a camera that moves meanwhile shears it.
+// Rolling shutters read an image row by row, over some 20 ms; the image is sheared if the camera moves
+// meanwhile.
 #include "plumbline/features/frame_features.hpp"
 #include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/sensor/camera.hpp"

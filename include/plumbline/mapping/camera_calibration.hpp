@@ -49,7 +49,7 @@ struct CalibrationOptions {
 };
 
 struct CameraCalibration {
-  sensor::Camera camera;  ///< the given one with what is believed
+  sensor::Camera camera;  ///< the given one with the accepted changes
   std::vector<CameraFinding> findings;
   int views = 0;
   int observations = 0;

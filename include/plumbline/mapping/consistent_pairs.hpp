@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Which of many relative poses between images are consistent. Each says how a keyframe of one map lies
-// to a keyframe of another (or of the same map, much later). Two agree when going round through both ends
-// nowhere near; the largest set of which every two agree is taken for true (pairwise consistency
-// maximisation: Mangelson, Dominic, Eustice, Vasudevan, ICRA 2018; docs/method/places.md). Places that repeat
-// give several such sets: a set is worth believing when no other one comes near its size.
+// Selects consistent relative poses of images. Each relates a keyframe of one map to a keyframe of another
+// (or of the same map, much later). Two are consistent if the loop through both ends near its start; the
+// largest set of which every two are consistent is accepted (pairwise consistency maximisation: Mangelson,
+// Dominic, Eustice, Vasudevan, ICRA 2018; docs/method/places.md). Repeated places give several such sets: a
+// set is credible if no other one is nearly as large.
 #include <cstddef>
 #include <cstdint>
 #include <vector>

@@ -66,9 +66,9 @@ struct KeyframeDecision {
 };
 
 /// Plain: enough parallax, rotation or loss of common features and surface; never so rarely that the map
-/// starves. Cone: a candidate whose landmarks are seen from other sides, evenly over the image; where next
-/// to no landmark knows its normal, as on what is lit but not measured, the plain rule speaks. Both: at once
-/// when tracking gets thin, and when depth is back after a keyframe that had none.
+/// starves. Cone: a candidate whose landmarks are seen from other sides, evenly over the image; if next to no
+/// landmark has a normal, as on surfaces that are lit but not measured, the plain rule decides. Both: at once
+/// if tracking gets thin, and if depth returns after a keyframe that had none.
 class KeyframeRule {
  public:
   KeyframeRule(const KeyframeRuleOptions& options, const sensor::Pinhole& camera)

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Local bundle adjustment (docs/method/mapping.md): a keyframe, what it shares landmarks or surfaces with,
-// and what they see. Three steps, so that the middle one can run beside the tracker: take from the map,
-// adjust, put back. The map may grow and lose landmarks between the first step and the last.
+// Local bundle adjustment (docs/method/mapping.md): a keyframe, those with which it shares landmarks or
+// surfaces, and the landmarks that they see. Three steps, so that the middle one can run beside the tracker:
+// take from the map, adjust, put back. The map may grow and lose landmarks between the first step and the
+// last.
 #include <map>
 #include <optional>
 #include <vector>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Local maps and how they lie to each other. A local map is the fused surface of a few keyframes that follow
-// one another; local maps that overlap, revisits included, are aligned by point-to-plane ICP, both ways at
-// once, weighted with the depth noise. Directions that the surfaces do not hold (along a corridor, within a
-// wall) are neither moved nor claimed to be known.
+// Local maps and their relative poses. A local map is the fused surface of a few consecutive keyframes; local
+// maps that overlap, revisits included, are aligned by point-to-plane ICP, both ways at once, weighted with
+// the depth noise. Directions that the surfaces do not hold (along a corridor, within a wall) are not moved
+// and get no information.
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>

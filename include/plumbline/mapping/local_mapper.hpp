@@ -40,7 +40,7 @@ struct LocalMapperOptions {
   optimize::BundleOptions bundle_options;
   tracking::SurfaceSamplerOptions surface;
   LocalMapperOptions() {
-    bundle_options.tolerance = 1e-3;  // the next keyframe's bundle goes on from here
+    bundle_options.tolerance = 1e-3;  // the next keyframe's bundle continues from here
     bundle_options.point_loss = 1.0;
     bundle_options.line_loss = 1.0;
   }
@@ -64,9 +64,9 @@ class LocalMapper {
   /// Counts which landmarks a tracked frame should have seen and did; not where keyframes alone count.
   void count_observations(maps::Map& map, const tracking::TrackResult& track) const;
 
-  /// Begins to align the surfaces of neighbouring keyframes, and what is known of their grey values, with the
-  /// depth image and the image of the new one: what they say about its pose becomes edges of the map. Nothing
-  /// without the option `edges`.
+  /// Starts to align the surfaces of neighbouring keyframes, and their grey values if available, with the
+  /// depth image and the image of the new one: the resulting constraints on its pose become edges of the map.
+  /// None without the option `edges`.
   [[nodiscard]] std::optional<SurfaceEdgeJob> begin_surface_edges(
       const maps::Map& map, core::KeyframeId keyframe, const cv::Mat& depth,
       const tracking::TrackResult& track, const tracking::PhotometricKeyframes& photometric,

@@ -122,10 +122,10 @@ class LoopCloser {
                                          const std::shared_ptr<const features::FrameFeatures>& features,
                                          const tracking::SurfaceSamplerOptions& surface);
 
-  /// Pose graph with these edges and the loops of the map; what it believes become the map's loops. When it
-  /// believes one of the new edges: moves the map, merges doubles around these, adjusts all. Returns whether
-  /// the map was moved. Edges may come from elsewhere too. Nothing must be under way that was taken from the
-  /// map before.
+  /// Solves a pose graph with these edges and the loops of the map; edges that it does not reject become the
+  /// map's loops. If one of the new edges is among them, the map is moved, duplicates around these edges are
+  /// merged, and everything is adjusted. Returns whether the map was moved. Edges may come from elsewhere
+  /// too. Nothing that was taken from the map before may be under way.
   bool close(maps::Map& map, const std::vector<PoseEdge>& edges);
 
   /// Drops loops that wait for others to agree with them: they were measured with another camera.

@@ -58,7 +58,8 @@ struct MapFusionOptions {
   void declare_decision(core::OptionTable& table, const std::string& prefix = "");
 };
 
-/// A map in a world frame of its own; its robots' numbers are no other part's. Outlives what is given it.
+/// A map in its own world frame; its robots' numbers differ from those of all other parts. Must outlive the
+/// functions it is passed to.
 struct MapPart {
   const maps::Map* map = nullptr;
   Cameras cameras;  ///< of its robots

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Maps become one when robots meet (docs/method/merging.md; Algorithm 2): every new keyframe is looked up
-// among those of the other robots; what looks alike is verified; when it is certain that two maps overlap,
-// all maps that hang together are laid into one frame by a pose graph. That frame is kept up as keyframes
-// come and move, further robots join it, and a merge is taken back when evidence turns against it. A preview:
-// doubles of landmarks are not merged, surfaces not aligned; fuse_maps of the finished maps has the last
-// word.
+// Merges maps while robots meet (docs/method/merging.md; Algorithm 2): every new keyframe is looked up among
+// those of the other robots; similar ones are verified; once it is certain that two maps overlap, all
+// connected maps are moved into one frame by a pose graph. That frame is updated as keyframes are added and
+// move, further robots join it, and a merge is taken back if later evidence contradicts it. It is a preview:
+// duplicate landmarks are not merged, surfaces not aligned; fuse_maps of the finished maps decides.
 //
-// Work goes on beside the caller, by logical time: what is begun at frame k of a log is committed at frame
-// k + lag, whatever the clock says. So the same log gives the same events for any number of threads.
+// Work runs beside the caller, by logical time: a job that is started at frame k of a log is committed at
+// frame k + lag, independent of the clock. So the same log gives the same events for any number of threads.
 #include <cstddef>
 #include <cstdint>
 #include <map>

@@ -80,8 +80,8 @@ class Slam {
   /// follow from the map. With a map without keyframes nothing happens.
   void restore(maps::Map map, std::vector<maps::FramePose> frames);
 
-  /// The camera that took the pictures, of which rectified images are made: its shutter, and what is measured
-  /// in them. To be called before the first frame; without it they are those of the pinhole.
+  /// Sets the camera that took the pictures from which rectified images are made: its shutter and lens. To be
+  /// called before the first frame; without it they are those of the pinhole.
   void set_camera(const sensor::Camera& camera);
   /// Replaces the camera by a refined one. The map is rebuilt for it and adjusted (recalibrate_map), and
   /// later frames must have been read with that camera. `read`: reads pictures of keyframes again; may be

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Clouds and surfaces are stored as they were read; here the latest version of their camera makes what it
-// measured of them (maps::RobotInfo).
+// Clouds and surfaces are stored as they were read; this converts them to the measurements of the latest
+// version of their camera (maps::RobotInfo).
 #include <map>
 #include <utility>
 #include <vector>

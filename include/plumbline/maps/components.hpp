@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Connected components of a map. A robot that lost itself goes on in a new component with an origin of its
-// own: poses of different components say nothing of each other until the components are joined. Each
-// component is one tree of keyframes (Map::parent).
+// Connected components of a map. A robot that got lost continues in a new component with its own origin:
+// poses of different components are unrelated until the components are joined. Each component is one tree of
+// keyframes (Map::parent).
 #include <vector>
 
 #include "plumbline/maps/frame_pose.hpp"
@@ -24,9 +24,9 @@ namespace plumbline::maps {
 /// The keyframes, points and lines of the component with this root move by new_from_old of their world.
 void move_component(Map& map, core::KeyframeId root, const geometry::Rigid3& new_from_old_world);
 
-/// Cuts the component of `first` in two: `first` becomes the root of what its robot made from then on, in
-/// which the other keyframes' landmarks are no longer seen, and nothing connects it with the rest: loops
-/// between the two are gone, and other edges say nothing. Nothing happens when `first` is a root.
+/// Cuts the component of `first` in two: `first` becomes the root of everything its robot made from then on.
+/// The other keyframes' landmarks are no longer seen there, and nothing connects the two parts: loops between
+/// them are removed, and other edges have no effect. Nothing happens if `first` is a root.
 void split_component(Map& map, core::KeyframeId first);
 
 /// All of the robots' frames, of which those whose reference keyframe is not in `map` are not tracked:

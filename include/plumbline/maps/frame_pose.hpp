@@ -17,8 +17,8 @@ class Map;
 
 using FrameId = core::Id<struct FrameTag>;  ///< a robot's frame: its place among the robot's FramePoses
 
-/// A landmark as the picture of a frame showed it (features::PixelDepth): what was measured, whatever the
-/// camera is believed to be.
+/// A landmark in the picture of a frame (features::PixelDepth): the raw measurement, independent of the
+/// assumed camera.
 struct SeenPoint {
   core::PointId point;
   Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  ///< of the picture, as the lens showed it
@@ -94,7 +94,7 @@ MapPoses poses_of(const Map& map, const std::vector<FramePose>& frames);
 /// The trajectory of each robot.
 std::map<std::int32_t, geometry::Trajectory> by_robot(const MapPoses& map);
 
-/// Gives poses in another frame in the place of their map's.
+/// Transforms poses from their map's frame into another one.
 void move(MapPoses& poses, const geometry::Rigid3& frame_from_map);
 
 }  // namespace plumbline::maps

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The map itself: keyframes, point and line landmarks, who sees what, and who sees the same. Data and its
+// The map itself: keyframes, point and line landmarks, their observations and covisibility. Data and its
 // rules; estimation lives elsewhere. One writer at a time; a const Map may be read by many threads.
 #include <Eigen/Core>
 #include <cstdint>
@@ -130,7 +130,7 @@ struct LandmarkPage {
   std::vector<Landmark> landmarks;  ///< by id
 };
 
-/// Parts of a map; everything else (who shares what, children) follows from them. For stores.
+/// Parts of a map; everything else (covisibility, children) follows from them. For stores.
 struct MapParts {
   struct KeyframePart {
     std::shared_ptr<const Keyframe> data;
@@ -145,8 +145,8 @@ struct MapParts {
   NextIds next;
 };
 
-/// Changes of a map since an earlier revision, for a copy that follows the map at the cost of what was
-/// touched.
+/// Changes of a map since an earlier revision, for a copy that follows the map at a cost that depends on the
+/// changes only.
 struct MapChanges {
   bool whole = false;                             ///< since before anything was there
   std::vector<MapParts::KeyframePart> keyframes;  ///< all of them: poses move
@@ -163,8 +163,8 @@ struct MapChanges {
 class Map {
  public:
   Map() = default;
-  /// The map that had these parts, with all its ids and orders. Throws std::invalid_argument when they
-  /// contradict each other: an id twice, something names what is not there, two landmarks of one feature.
+  /// The map that had these parts, with all its ids and orders. Throws std::invalid_argument if they
+  /// contradict each other: a repeated id, a reference to something missing, two landmarks of one feature.
   explicit Map(MapParts parts);
   [[nodiscard]] NextIds next_ids() const;
   [[nodiscard]] MapRevision now() const { return {points_.revision(), lines_.revision(), next_edge_}; }

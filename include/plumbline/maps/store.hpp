@@ -30,9 +30,9 @@ struct CameraVersion {
   std::int32_t first_frame = 0;     ///< frames of the robot's path, likewise
 };
 
-/// A robot of a map. All images are rectified to the pinhole of `camera`, whatever it turned out to be.
-/// Keyframes and landmarks are those of the latest version; clouds and their surfaces are stored as they were
-/// read, and CameraHistory makes the latest version's of them.
+/// A robot of a map. All images are rectified to the pinhole of `camera`, also after refinement. Keyframes
+/// and landmarks are those of the latest version; clouds and their surfaces are stored as they were read, and
+/// CameraHistory converts them to the latest version.
 struct RobotInfo {
   std::int32_t number = 0;  ///< in the map's ids
   std::string name;
@@ -114,7 +114,7 @@ struct StoreStep {
 
 /// Ways to make a new store.
 enum class StoreUse {
-  kGrowing,  ///< while a run goes: whatever ends the program, the file holds what was added
+  kGrowing,  ///< during a run: however the program ends, the file holds everything added
   kInOneGo,  ///< at the end of a run, quicker: nothing can be relied on before save_final()
 };
 

@@ -33,8 +33,8 @@ struct StoredViews {
 /// Order of arrival of the frames' clouds; frames that are not listed came before all of these.
 using Arrivals = std::map<FrameId, std::size_t>;
 
-/// `reader` must outlive the views. `robots`: what their cameras turned out to be. Frames stand in the order
-/// of their arrival, else by robot and order: sums of a dense cloud are rounded as they come. Errors
+/// `reader` must outlive the views. `robots`: with the versions of their cameras. Frames are in the order of
+/// their arrival, else by robot and order, because sums of a dense cloud are rounded in that order. Errors
 /// (kInput): damaged.
 core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& map,
                                    const std::vector<RobotInfo>& robots, const Arrivals& arrivals = {});

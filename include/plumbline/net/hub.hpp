@@ -45,7 +45,7 @@ struct HubRequest {
 /// Receives a line for people whenever there is something new.
 using Status = std::function<void(const std::string&)>;
 
-/// Collects until all robots are done or `stop` is requested, then fuses what is there. The summary's
+/// Collects until all robots are done or `stop` is requested, then fuses the received maps. The summary's
 /// `reason` names missing robots. Errors as pipeline::fuse_stored_maps; (kUsage) options, another hub in the
 /// domain; (kUntrustworthy) stopped with no map to fuse. Received maps stay in OUT.partial in any case.
 /// `status` and `progress` may be empty.

@@ -76,9 +76,10 @@ struct BundleOptions {
   double edge_loss = 4.0;
   double point_gate = 7.8;  ///< squared standard deviations; beyond: outlier
   double line_gate = 9.2;
-  /// Standard deviations. Observations that are further off, and by more than 0.8 px, before the first round
-  /// take no part in it, and come back when they fit what it finds; 0: all begin. For poses that something
-  /// better than these observations has just corrected: those that made the error would restore it.
+  /// Gate in standard deviations: observations beyond it, and off by more than 0.8 px, are left out of the
+  /// first round, and come back if they fit its result; 0: all are used. It is meant for poses that have just
+  /// been corrected by better evidence: the observations that made the error would restore
+  /// it.
   double first_gate = 0.0;
   void declare(core::OptionTable& table);
 };

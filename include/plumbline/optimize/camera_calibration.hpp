@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Bundle adjustment with the camera among the unknowns: poses, points, and what all pictures share (Zhang,
-// PAMI 22, 2000; readout as in Hedborg, Forssen, Felsberg, Ringaby, CVPR 2012). Poses and points are
-// eliminated: what is left is a quadratic function of the camera, which answers any question about it at
+// Bundle adjustment with the camera among the unknowns: poses, points, and the parameters that all pictures
+// share (Zhang, PAMI 22, 2000; readout as in Hedborg, Forssen, Felsberg, Ringaby, CVPR 2012). Poses and
+// points are eliminated: the result is a quadratic function of the camera, from which any trial follows at
 // once. Plain structs in and out; Ceres inside. Deterministic: one thread, fixed order.
 #include <Eigen/Core>
 #include <array>

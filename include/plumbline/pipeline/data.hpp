@@ -75,7 +75,7 @@ struct MapResult : maps::MapPoses {
   std::vector<maps::FramePose> frame_poses;         ///< empty when `map` is null
   std::vector<mapping::KeyframeAccuracy> accuracy;  ///< of the keyframes; empty: not known
   std::vector<maps::LineSegment3> lines;
-  std::vector<RobotInfo> robots;  ///< by number, with what their cameras turned out to be; empty: one robot
+  std::vector<RobotInfo> robots;  ///< by number, with the versions of their cameras; empty: one robot
   std::string frame_columns;      ///< header of FrameRow::columns
   std::vector<FrameRow> frames;   ///< by frame
   /// Components of the robots' maps that never joined this one, each in a frame of its own; they have none
@@ -84,9 +84,9 @@ struct MapResult : maps::MapPoses {
   std::string name;  ///< of such a component
 };
 
-/// Filtered cloud of one keyframe, or of a frame between keyframes, camera frame; or of such a frame what it
-/// sees through (cloud::depth_view). Its points are those of the depth camera at the moment of the depth
-/// image: cloud::sensor_pose() leads from there to the camera of the poses.
+/// Filtered cloud of one keyframe, or of a frame between keyframes, in the camera frame; or, for such a
+/// frame, its free space (cloud::depth_view). Its points are those of the depth camera at the moment of the
+/// depth image: cloud::sensor_pose() leads from there to the camera of the poses.
 struct KeyframeCloud {
   core::KeyframeId id;    ///< not valid: a frame between keyframes
   maps::FrameId frame;    ///< as TrackedFrame

@@ -30,8 +30,8 @@ struct MapRequest : RunRequest {
   double pace_hz = 0.0;
   /// Folder for one picture per frame of what the tracker sees; empty: none.
   std::filesystem::path debug_video;
-  /// Frames that are still coming, in the place of `input`, which is then only a name for the results.
-  /// Nothing is resumed. The run ends when they are closed.
+  /// Frames that are still arriving, instead of `input`, which is then only a name for the results. Nothing
+  /// is resumed. The run ends when they are closed.
   std::shared_ptr<dataset::LiveFrames> live;
   /// Called before the first frame with the folder that the run writes into, where map.db will be, and again
   /// if the run starts again with another camera: nothing earlier is there then. May be empty.

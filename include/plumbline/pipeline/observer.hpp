@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Somebody who looks on while a map is made: shows it, or sends it on. What it does changes no result.
+// Observer of a map while it is made: shows it, or sends it on. It never changes a result.
 #include <cstdint>
 #include <string>
 #include <vector>

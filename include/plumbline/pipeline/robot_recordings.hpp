@@ -91,7 +91,7 @@ class RobotRecordings : public dataset::FrameSource {
   std::string name_;
   std::vector<std::unique_ptr<dataset::FrameSource>> recordings_;
   std::vector<RobotInfo> robots_;
-  std::vector<Place> order_;  ///< none of what is live
+  std::vector<Place> order_;  ///< empty for live sources
   mutable std::mutex mutex_;  ///< of what follows
   std::size_t corrected_from_ = 0;
   std::vector<std::shared_ptr<const dataset::FrameSource>> corrected_;  ///< by robot; empty: none

@@ -41,7 +41,7 @@ struct RunReport {
   std::vector<float> rss_mb;        ///< one per frame, when it was done; NaN = not known
 };
 
-/// Called in frame order, from one thread at a time; `total` 0: not known (what is live).
+/// Called in frame order, from one thread at a time; `total` 0: not known (live sources).
 using Progress = std::function<void(std::size_t done, std::size_t total)>;
 
 /// With a pace (`pace_hz` > 0) frame n of a recording is handed out no earlier than n / pace_hz seconds

@@ -227,8 +227,8 @@ class Stage {
   /// After the last frame, in graph order; reads and writes the ports of Rate::kEnd. Stages that export and
   /// do not need one another finish side by side.
   virtual core::Result<void> finish(StageIo& /*io*/) { return {}; }
-  /// Asked after check: what is to be made of the result folder once everything else in it is written, in the
-  /// forms of plumbline export; outputs are named below it. Null: nothing.
+  /// Exports to make from the result folder once everything else in it is written, in the formats of
+  /// plumbline export; outputs are named below it. Called after check. Null: none.
   [[nodiscard]] virtual const std::vector<exports::ExportRequest>* wanted_exports() const { return nullptr; }
   /// Fills in what this stage knows in the sections of summary.json; in graph order.
   virtual void report(nlohmann::ordered_json& /*summary*/) const {}
@@ -236,9 +236,9 @@ class Stage {
   virtual void doubt(const nlohmann::ordered_json& /*summary*/, std::vector<Doubt>& /*reasons*/) const {}
   /// Times of parts of this stage's work, named "stage.part".
   [[nodiscard]] virtual std::vector<StageTiming> parts() const { return {}; }
-  /// Asked before the run: it draws what it sees of each frame (RunHooks::debug_folder).
+  /// True if it draws the tracker's view of each frame (RunHooks::debug_folder). Called before the run.
   [[nodiscard]] virtual bool draws_frames() const { return false; }
-  /// Asked before the run: it can go on from an earlier one (RunContext::resumed).
+  /// True if it can continue an earlier run (RunContext::resumed). Called before the run.
   [[nodiscard]] virtual bool resumes() const { return false; }
   /// Asked before the run: poses that come with the recording are taken as they are.
   [[nodiscard]] virtual bool takes_given_poses() const { return false; }

@@ -7,7 +7,7 @@
 namespace plumbline::pipeline {
 
 struct RunSummary {
-  std::string reason;  ///< why the result must not be trusted as it is; empty: nothing speaks against it
+  std::string reason;  ///< reason not to trust the result; empty: there is none
   std::string json;    ///< summary.json (docs/reference/files.md)
   std::string text;    ///< a few lines for people
 };

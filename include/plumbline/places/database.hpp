@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Keyframes by what they look like (docs/method/places.md): image vectors over the words of a vocabulary, an
-// inverted index that votes, and a vocabulary that goes on learning from what is added.
+// Keyframes by appearance (docs/method/places.md): image vectors over the words of a vocabulary, an inverted
+// index that votes, and a vocabulary that keeps learning from added keyframes.
 #include <cstddef>
 #include <cstdint>
 #include <functional>

@@ -13,7 +13,7 @@ namespace plumbline::places {
 class BitCounter {
  public:
   void add(const features::Descriptor256& descriptor);
-  /// Bits set in more than half of what was added; a tie gives 0.
+  /// Bits set in more than half of the added descriptors; a tie gives 0.
   [[nodiscard]] features::Descriptor256 majority() const;
   [[nodiscard]] std::uint32_t count() const { return count_; }
 

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The dictionary of what is seen (docs/method/places.md): one tree of words for points, one for lines; a leaf
-// is a word. It grows with what it is shown: a word that has become too common is divided, and nothing else
-// changes.
+// The visual vocabulary (docs/method/places.md): one tree of words for points, one for lines; a leaf is a
+// word. It grows with its input: a word that has become too common is divided, and nothing else changes.
 #include <array>
 #include <cstddef>
 #include <cstdint>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A result folder as one HTML page: what was mapped, whether to trust it, pictures, paths, tables.
+// A result folder as one HTML page: the map, whether to trust it, pictures, paths, tables.
 #include <cstdint>
 #include <filesystem>
 #include <string>

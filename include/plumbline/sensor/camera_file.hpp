@@ -39,7 +39,7 @@ bool is_foreign_camera_file(const std::filesystem::path& file, bool numbers_too)
 /// Problem with the camera's numbers for images of its size; "" if there is none.
 std::string camera_problem(const Camera& camera);
 
-/// Lines of a camera.yaml with what is known of `camera`, and places to fill in where it is 0.
+/// Lines of a camera.yaml with the known values of `camera`, and blanks to fill in where they are 0.
 std::string camera_lines(const Camera& camera);
 
 }  // namespace plumbline::sensor

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// From the pixels that a lens shows to those of a rectified image and back, and what changes in rectified
-// images when their camera turns out to be another one. Rectified images are those of one nominal pinhole,
-// whatever the camera is believed to be.
+// Conversion between the pixels that a lens shows and those of a rectified image, and the changes in
+// rectified images when their camera is refined. Rectified images are always those of one nominal pinhole.
 #include <Eigen/Core>
 #include <vector>
 

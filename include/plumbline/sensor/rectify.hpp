@@ -13,7 +13,7 @@ namespace plumbline::sensor {
 class Rectifier {
  public:
   explicit Rectifier(const Camera& camera) : Rectifier(camera, camera.color) {}
-  /// Into images of the pinhole camera `target`, of the same size, in the place of `camera.color`.
+  /// Rectifies into images of the pinhole camera `target`, of the same size, instead of `camera.color`.
   Rectifier(const Camera& camera, const Pinhole& target);
   ~Rectifier();
   /// 8-bit image, 1 or 3 channels, of the camera's size -> undistorted (bilinear); the same image when

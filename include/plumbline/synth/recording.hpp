@@ -21,7 +21,7 @@ struct WriteSummary {
   std::size_t reference_samples = 0;  ///< points of reference.ply
   std::size_t reference_visible = 0;  ///< of these seen by a camera within the sensor's range
   double reference_spacing_m = 0.0;
-  bool stopped = false;  ///< ended early; what is there is complete up to the last frame listed
+  bool stopped = false;  ///< ended early; the files are complete up to the last frame listed
   double wall_s = 0.0;   ///< of rendering and writing the frames
 };
 

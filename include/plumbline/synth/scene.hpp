@@ -63,7 +63,7 @@ struct Waypoint {
 struct RobotPath {
   std::string name;
   std::vector<Waypoint> waypoints;  ///< at least 2
-  bool closed = false;              ///< the way goes on from the last waypoint to the first
+  bool closed = false;              ///< the path continues from the last waypoint to the first
   double speed = 0.5;               ///< m/s
   double turn_rate = 0.6;           ///< rad/s, slower where the camera has to turn faster
 };

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Direct alignment with keyframes: which of their samples a camera sees, and whether what it sees is the
-// same.
+// Direct alignment with keyframes: selects the samples of theirs that a camera sees, and tests whether they
+// look the same.
 #include <memory>
 #include <optional>
 #include <utility>
@@ -26,9 +26,8 @@ struct PhotometricView {
   sensor::Pinhole camera;  ///< of the full image
 };
 
-/// The samples of a level that the view shows from a pose: in the image, and not hidden by what its depth
-/// image measured. None when there are fewer than kMinPhotometric. Gain and noise are those found at the
-/// pose.
+/// The samples of a level that the view shows from a pose: in the image, and not hidden according to its
+/// depth image. None if there are fewer than kMinPhotometric. Gain and noise are those found at the pose.
 std::optional<optimize::PhotometricFamily> associate_photometric(const features::PhotometricSamples& samples,
                                                                  std::size_t level,
                                                                  const PhotometricView& view,

@@ -41,9 +41,9 @@ struct TrackerOptions {
   bool thumbnails = true;    ///< search for the pose with small images
   bool motion_prior = true;  ///< the motion model holds what measurements leave open
   bool pnp_start = false;  ///< every frame begins with PnP, where there are matches enough (METHOD section 2)
-  /// Time from the first to the last row of an image, s; 0: all at once. What it shears is put right before
-  /// a frame is tracked (features::undo_rolling_shutter), by the motion model, and again by the motion that
-  /// was found.
+  /// Time from the first to the last row of an image, s; 0: all at once. The shear is corrected before a
+  /// frame is tracked (features::undo_rolling_shutter), by the motion model, and again by the motion that was
+  /// found.
   double readout_s = 0.0;
   int min_inliers = 15;
   int min_surface = 300;
@@ -60,7 +60,7 @@ struct TrackResult {
   geometry::Rigid3 camera_from_world;
   geometry::Rigid3 depth_from_camera;  ///< motion between the stamps of colour and depth
   std::vector<PointMatch> points;      ///< inliers
-  /// Matches that look like their landmark but lie too far from it: what a wrong camera does to right ones.
+  /// Matches that look like their landmark but lie too far from it: a wrong camera does that to right ones.
   std::vector<PointMatch> doubtful;
   std::vector<LineMatch> lines;
   std::vector<core::PointId> visible_points;  ///< landmarks that should have been seen
@@ -83,12 +83,12 @@ struct TrackResult {
   /// Projects a motion (left perturbation of camera_from_world) onto the degenerate directions, or, when it
   /// is not dead reckoned, onto those known no better than a step is long.
   geometry::Matrix6d onto_degenerate = geometry::Matrix6d::Zero();
-  bool motion_contradicted = false;  ///< surfaces are all but alone, and speak against the motion model
+  bool motion_contradicted = false;  ///< surfaces, nearly alone, contradict the motion model
   bool relocalised = false;
   double turn_rate = 0.0;  ///< since the frame before, rad/s, where that distorts an image; 0: global shutter
   std::shared_ptr<const features::PhotometricImage> photometric;  ///< of the frame; null: none was made
-  /// The frame's features, freed of the rolling shutter, points with the depth of the colour image's stamp:
-  /// what was matched, and what a keyframe should keep.
+  /// The frame's features without rolling shutter, points with depth at the colour image's stamp: those that
+  /// were matched, and that a keyframe should keep.
   std::shared_ptr<const features::FrameFeatures> features;
 };
 
@@ -124,8 +124,8 @@ class Tracker {
   /// of camera_from_world per second.
   void restore(const maps::Map& map, core::KeyframeId reference, const geometry::Vector6d& velocity);
 
-  /// Who knows which keyframes of the map look like an image, best first. Asked when tracking is lost,
-  /// beside what the tracker finds by itself.
+  /// Function that finds the keyframes of the map which look like an image, best first. Called when tracking
+  /// is lost, in addition to the tracker's own search.
   using PlaceFinder = std::function<std::vector<core::KeyframeId>(const features::FrameFeatures&)>;
   void set_place_finder(PlaceFinder finder) { find_places_ = std::move(finder); }
 

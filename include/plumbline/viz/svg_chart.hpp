@@ -68,8 +68,8 @@ std::string svg_chart_style();
 /// but its own, nothing but what any viewer of SVG knows.
 std::string svg_document(const std::vector<SvgChart>& charts, std::size_t columns);
 
-/// Text as it may stand in HTML and XML, in attributes too: markup escaped, what is not UTF-8 or a control
-/// character replaced by U+FFFD.
+/// Text for HTML and XML, in attributes too: markup is escaped; invalid UTF-8 and control characters are
+/// replaced by U+FFFD.
 std::string markup_text(std::string_view text);
 
 }  // namespace plumbline::viz

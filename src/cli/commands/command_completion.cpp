@@ -128,7 +128,7 @@ class ShippedNames : public NameSource {
 
 struct CompleteRequest {
   std::string line;                ///< all of it, as typed; empty: `words` are given
-  std::string word;                ///< what the shell takes for the last word, where it splits at '=' and ':'
+  std::string word;                ///< last word according to the shell, which splits at '=' and ':'
   std::vector<std::string> words;  ///< behind the program's name
 };
 

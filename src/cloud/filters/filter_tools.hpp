@@ -121,7 +121,7 @@ inline CloudPtr finite_list(const Cloud& input) {
   return output;
 }
 
-/// The same for those who only look: the input itself when it is such a list already.
+/// The same for read-only use: the input itself if it is such a list already.
 inline CloudConstPtr finite_list(const CloudConstPtr& input) {
   const bool list = !organised(*input) && input->width == input->size() && input->is_dense &&
                     std::all_of(input->begin(), input->end(), finite);

@@ -91,7 +91,7 @@ class Fusion {
  private:
   [[nodiscard]] bool several_robots() const { return !views_.robots.empty(); }
 
-  /// Asks every view: where it reaches, what it looks through, its colours.
+  /// Reads every view: its extent, its free space, its colours.
   core::Result<void> read_views(FusionReport& report) {
     const std::size_t count = views_.world_from_camera.size();
     std::vector<std::vector<ColorCell>> cells(count);
@@ -198,7 +198,7 @@ class Fusion {
     return points;
   }
 
-  /// Without what is seen through and without isolated points; settled.
+  /// Removes points that are seen through and isolated points, and projects the rest.
   void clean(std::vector<FusedPoint>& points, FusionReport& report) const {
     Surfels surfels(points, block_m(options_.voxels.voxel_m));
     std::vector<std::uint8_t> goes(surfels.all().size(), 0);
@@ -239,7 +239,7 @@ class Fusion {
     }
   }
 
-  /// Puts points of a tile behind the others, and what is known of them.
+  /// Appends the points of a tile, with their columns.
   void add(const std::vector<FusedPoint>& points, FusedCloud& all) const {
     append(points, several_robots(), all);
     if (views_.covariances.empty()) return;

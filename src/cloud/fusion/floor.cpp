@@ -62,7 +62,7 @@ pcl::Indices level_plane(const CloudConstPtr& points, const pcl::IndicesPtr& amo
   return inliers.indices;
 }
 
-/// Planes by RANSAC, one after the other in what is left; the first is the largest, or nearly so.
+/// Planes by RANSAC, one after the other among the remaining points; the first is the largest, or nearly so.
 std::vector<Found> planes_of(const CloudConstPtr& points, const Eigen::Vector3d& up) {
   constexpr std::size_t kFewest = 50, kMost = 8;
   constexpr double kLargeShare = 0.2;  // of the largest one

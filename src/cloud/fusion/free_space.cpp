@@ -290,7 +290,8 @@ std::vector<std::uint8_t> seen_through(const Surfels& surfels, const std::vector
   for (int pass = 0; pass < kPasses; ++pass) {
     const std::vector<Verdict> before = verdicts;
     for (std::uint32_t s = 0; s < goes.size(); ++s) {
-      // Only what is hardly seen goes with what was itself a doubt: else good surfaces would go one by one.
+      // Only hardly seen surfels are removed along with doubtful ones; otherwise good surfaces would be
+      // removed one by one.
       const bool asked = before[s] == Verdict::kHardlySeen || (pass == 0 && before[s] == Verdict::kDoubtful);
       if (asked && around.go(s, before)) verdicts[s] = Verdict::kGoes;
     }

@@ -30,10 +30,10 @@ struct FusionTile {
   }
 };
 
-/// k-d cuts at medians until no box holds more than `most_cells` occupied cells, and about four boxes at
-/// least where there is enough for them. Boxes take the cells around what is occupied along, as far as no
-/// other box has them. `views`: the cells of each, by cell. A view belongs to a tile when it has points in it
-/// or in one of the cells around it. In a fixed order.
+/// k-d cuts at medians until no box holds more than `most_cells` occupied cells, with at least about four
+/// boxes if there are enough cells. Boxes include the cells around their occupied ones, unless another box
+/// has them. `views`: the cells of each, by cell. A view belongs to a tile if it has points in it or in one
+/// of the cells around it. In a fixed order.
 std::vector<FusionTile> plan_tiles(const std::vector<std::vector<ColorCell>>& views, std::size_t most_cells);
 
 }  // namespace plumbline::cloud

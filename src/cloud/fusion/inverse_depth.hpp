@@ -40,7 +40,8 @@ Grid smooth_inverse_depth(const cv::Mat& depth, int stride, int window, float mi
 /// changed.
 void widen_means(Grid& inverse_depth, int step, float noise, float wanted_m);
 
-/// For every cell how many cells the surface goes on in a direction without a jump, at most `longest`.
+/// For every cell the number of cells over which the surface continues in a direction without a jump, at most
+/// `longest`.
 struct Reach {
   std::vector<std::uint8_t> left, right, up, down;
 };

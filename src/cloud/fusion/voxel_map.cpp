@@ -36,7 +36,7 @@ bool opposed(const VoxelSide& sample, const VoxelSide& front) {
   return along < 0.0F && along < kOpposed * front.normal.norm() * sample.normal.norm();
 }
 
-/// Majority vote on who measured most of the samples (Boyer and Moore).
+/// Majority vote on the robot that measured most of the samples (Boyer and Moore).
 void vote(const VoxelSide& sample, VoxelSide& side) {
   constexpr std::uint32_t kMost = 0x7FFFFFU;
   if (side.weight == 0.0F) {

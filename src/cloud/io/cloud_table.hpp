@@ -40,7 +40,7 @@ class CloudBuilder {
   /// Meanings and names of the file's columns; prepares those that the cloud gets.
   CloudBuilder(const std::vector<Meaning>& meanings, const std::vector<std::string>& names,
                std::size_t points);
-  /// Keeps the values of an axis as doubles until all are there; finish() takes a shift off them.
+  /// Keeps the values of an axis as doubles until all are read; finish() then subtracts a shift.
   void keep_digits(Meaning axis);
   /// False when x, y or z is missing.
   [[nodiscard]] bool has_position() const { return position_; }

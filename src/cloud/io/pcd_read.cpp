@@ -177,7 +177,7 @@ std::string read_binary(ByteReader& reader, const PcdHeader& header, CloudBuilde
   return "";
 }
 
-/// Colours are also written as signed integers; what is no such number at all is black.
+/// Colours are also written as signed integers; other numbers become black.
 std::uint32_t packed_color(double value) {
   const bool fits = value >= -2147483648.0 && value <= 4294967295.0;
   return fits ? static_cast<std::uint32_t>(static_cast<std::int64_t>(value)) : 0U;

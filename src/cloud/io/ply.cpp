@@ -151,8 +151,8 @@ bool has_lists(const PlyElement& element) {
                      [](const auto& p) { return p.list; });
 }
 
-/// Reads record by record what is no list, and lists into the body's items; visit(row, property, value) says
-/// whether to go on. Returns how many records were read.
+/// Reads scalars record by record, and lists into the body's items; visit(row, property, value) returns
+/// whether to continue. Returns the number of records read.
 template <typename Visit>
 std::uint64_t read_records(Body& body, const PlyElement& element, const Visit& visit) {
   for (std::uint64_t row = 0; row < element.count; ++row) {
@@ -250,7 +250,7 @@ std::uint64_t read_edges(Body& body, const PlyElement& element, PlyData& data) {
   });
 }
 
-/// "" or what is wrong with the records of one element.
+/// Reads the records of one element. Returns "" or what is wrong with them.
 std::string read_element(Body& body, const PlyElement& element, bool take_shift, PlyData& data) {
   const std::size_t least = element.least_size(body.ascii());
   // The last word of an ascii file needs no blank after it.

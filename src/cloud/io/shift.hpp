@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Coordinates that are too large for the 32-bit floats of a cloud, such as UTM's: what is taken off them
-// while reading, and put back while writing.
+// Coordinates that are too large for the 32-bit floats of a cloud, such as UTM's: the shift that is
+// subtracted while reading, and added while writing.
 #include <Eigen/Core>
 #include <string>
 #include <vector>

@@ -30,7 +30,7 @@ struct InfoCamera {
   std::string frame;
 };
 
-/// The lens of a CameraInfo; what is wrong with it otherwise.
+/// The lens of a CameraInfo, or what is wrong with it.
 tl::expected<sensor::Lens, std::string> lens_of(const CameraInfoMessage& info) {
   sensor::Lens lens;
   const std::string& model = info.distortion_model;
@@ -45,7 +45,7 @@ tl::expected<sensor::Lens, std::string> lens_of(const CameraInfoMessage& info) {
         "has the distortion model '{}' (known: plumb_bob, rational_polynomial, equidistant)", model));
   }
   const std::size_t most = fisheye ? 4 : lens.k.size();
-  // OpenCV's models of 12 and 14 coefficients go on with what is nearly always 0.
+  // OpenCV's models of 12 and 14 coefficients have further ones that are nearly always 0.
   for (std::size_t i = 0; i < info.d.size(); ++i) {
     if (!std::isfinite(info.d[i]) || (i >= most && info.d[i] != 0.0))
       return tl::unexpected(

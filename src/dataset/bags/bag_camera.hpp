@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The camera of a bag: what its CameraInfo and its transforms say.
+// The camera of a bag, from its CameraInfo and its transforms.
 #include <optional>
 
 #include "bags/topics.hpp"

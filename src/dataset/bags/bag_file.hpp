@@ -17,7 +17,7 @@ namespace plumbline::dataset {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// Messages larger than this are taken for damaged lengths.
+/// Size above which a message is assumed to have a damaged length.
 constexpr std::uint64_t kMostMessageBytes = std::uint64_t{1} << 28;
 /// Bytes of each message that are available while a bag is scanned: a stamp and the beginning of the rest.
 constexpr std::size_t kHeadBytes = 64;

@@ -23,9 +23,9 @@ struct ChosenTopics {
   ChosenTopic depth_info;  ///< CameraInfo of depth
 };
 
-/// Names in `named` win over what is found. Error (kUsage): a topic that is not there or of another type;
-/// what is not certain: all that could be meant, and the option. Error (kInput): no colour or no depth at
-/// all.
+/// Chooses the topics to map; names in `named` take precedence. Error (kUsage): a topic that does not exist
+/// or is of another type; an ambiguous choice, with the candidates and the option. Error (kInput): no colour
+/// or no depth.
 core::Result<ChosenTopics> choose_topics(const BagSurvey& survey, const TopicNames& named);
 
 /// A line for each of the chosen, with the reason.

@@ -27,8 +27,8 @@ core::Result<std::unique_ptr<CopyTarget>> make_tum_target(const std::filesystem:
 core::Result<std::unique_ptr<CopyTarget>> make_mcap_target(const std::filesystem::path& file,
                                                            const sensor::Camera& camera, core::Log& log);
 
-/// Messages into any bag. `standard_depth`: depth in other units than millimetres is given in metres, for
-/// those who do not have the camera file, and nothing is said.
+/// Messages into any bag. `standard_depth`: depth in other units than millimetres is written in metres, for
+/// readers without the camera file, and without a warning.
 std::unique_ptr<CopyTarget> make_message_target(std::unique_ptr<BagWriter> bag, const sensor::Camera& camera,
                                                 bool standard_depth, core::Log& log);
 

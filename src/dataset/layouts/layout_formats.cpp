@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Which layouts there are, and what is said of a folder that has none of them.
+// Table of layouts, and messages about a folder that has none of them.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -56,7 +56,7 @@ std::string what_is_there(const fs::path& folder) {
   return text;
 }
 
-/// The layout with the largest share of its parts there, and what it lacks; "" when none has any.
+/// The layout of which the largest share of parts exists, and what it lacks; "" if no layout has any part.
 std::string nearest_layout(const fs::path& folder) {
   double best = 0.0;
   std::string text;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Which format a trajectory has, and what is read alike in all.
+// Detection of a trajectory's format, and reading that all formats share.
 #include "trajectories/trajectory_formats.hpp"
 
 #include <fmt/format.h>

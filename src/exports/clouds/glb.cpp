@@ -82,7 +82,7 @@ std::size_t byte_size(const std::vector<T>& values) {
   return values.size() * sizeof(T);
 }
 
-/// The buffer's parts one behind the other, and who reads them how.
+/// The JSON part: the buffer's sections one after another, and the accessors that read them.
 Json glb_json(const GlbData& data, const std::string& name, const std::string& frame) {
   constexpr int kFloat = 5126, kShort = 5123, kInt = 5125, kVertices = 34962, kIndices = 34963;
   std::array<float, 3> low{}, high{};

@@ -33,7 +33,7 @@ class RayCounter {
       : grid_(grid), low_m_(low_m), high_m_(high_m), counts_(grid.cells.size(), 0) {}
 
   void add(const ViewRays& rays) {
-    const double margin_m = 1.5 * grid_.resolution_m;  // before what was hit: noise, and the cell itself
+    const double margin_m = 1.5 * grid_.resolution_m;  // in front of the hit: noise, and the cell itself
     for (const Eigen::Vector3f& end : rays.ends) {
       const Eigen::Vector3d way = end.cast<double>() - rays.origin;
       const double length_m = way.norm();

@@ -72,7 +72,7 @@ DrawingSheet sheet_of(const Drawing& drawing);
 
 /// Errors: kOutput.
 core::Result<void> write_svg(const std::filesystem::path& file, const Drawing& drawing);
-/// DXF R2000. `move`: what is done to all places, which moves a plan into world coordinates.
+/// Writes DXF R2000. `move`: transform of all positions, which moves a plan into world coordinates.
 core::Result<void> write_dxf(const std::filesystem::path& file, const Drawing& drawing,
                              const Eigen::Matrix2d& turn = Eigen::Matrix2d::Identity(),
                              const Eigen::Vector2d& origin = Eigen::Vector2d::Zero());

@@ -143,8 +143,8 @@ bool in_line(const WallLine& a, const WallLine& b) {
          std::abs(a.normal.dot(b.at(0.5 * (b.s0 + b.s1))) - a.offset_m) < kSameLine_m;
 }
 
-/// Door leaves and pieces of furniture: short ones that do not meet walls at both ends, or one at a right
-/// angle, nor go on along a line.
+/// Drops door leaves and pieces of furniture: short pieces that neither meet walls at both ends, or one at a
+/// right angle, nor continue along a line.
 void drop_loose_pieces(std::vector<WallLine>& walls) {
   constexpr double kShort_m = 1.5;
   constexpr double kSquare = 0.05;  // cosine: within 3 degrees

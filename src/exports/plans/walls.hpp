@@ -18,7 +18,7 @@ struct WallOpening {
 
 /// One side of a wall, seen from above: places p with normal . p = offset, from s0 to s1 along its direction.
 struct WallLine {
-  Eigen::Vector2d normal = Eigen::Vector2d::UnitX();  ///< unit, towards who sees the wall
+  Eigen::Vector2d normal = Eigen::Vector2d::UnitX();  ///< unit, towards the cameras that see the wall
   double offset_m = 0.0;
   double s0 = 0.0;
   double s1 = 0.0;

@@ -7,7 +7,7 @@
 
 namespace plumbline::exports {
 
-/// Stands in every folder that an export made: what it is, in which frame.
+/// File in every folder that an export made: it names the content and its frame.
 inline constexpr const char* kExportNote = "plumbline_export.txt";
 
 /// A folder that appears whole or not at all, as maps::OutputFolder; only an earlier export is ever replaced.

@@ -45,7 +45,7 @@ core::Result<std::optional<Georeference>> georeference_of(const ExportOptions& o
 
 /// The cloud in world coordinates; its large part is its shift.
 cloud::CloudFile to_world(const cloud::CloudFile& file, const Georeference& reference);
-/// FILE.georeference.json: what was applied.
+/// Writes FILE.georeference.json: the transform that was applied.
 core::Result<void> write_georeference(const std::filesystem::path& file, const Georeference& reference);
 
 }  // namespace plumbline::exports

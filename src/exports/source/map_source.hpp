@@ -37,7 +37,7 @@ class MapSource {
   void progress(std::size_t done, std::size_t total) const {
     if (*progress_) (*progress_)(done, total);
   }
-  /// The name of what is exported, for titles.
+  /// The name of the exported map, for titles.
   [[nodiscard]] std::string name() const;
 
   /// The map's store, for what only it holds; `what`: "free space" and the like, for the message. Errors

@@ -33,7 +33,7 @@ class Pictures {
   std::map<std::int32_t, Recording> by_robot_;
 };
 
-/// A picture of a model: who took it where, and what it is called.
+/// A picture of a model: its camera, pose and name.
 struct Picture {
   ExportPose pose;
   std::string name;                  ///< "000001", several robots "r0_000001"

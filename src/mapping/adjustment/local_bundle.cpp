@@ -145,7 +145,7 @@ class Builder {
     for (KeyframeId id : std::vector<KeyframeId>(bundle_.keyframes)) {
       for (const maps::SurfaceEdge& edge : map_.edges_of(id)) {
         const KeyframeId other = edge.a == id ? edge.b : edge.a;
-        if (!has(other)) count[other] += 50;  // an edge holds as much as many landmarks do
+        if (!has(other)) count[other] += 50;  // an edge counts like many landmarks
       }
     }
     std::vector<std::pair<KeyframeId, int>> others(count.begin(), count.end());

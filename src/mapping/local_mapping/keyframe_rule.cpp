@@ -117,7 +117,7 @@ bool KeyframeRule::is_urgent(const KeyframeDecision& d, int tracked) const {
   return d.shared < 0.5 * options_.min_shared || d.overlap < 0.5 * options_.min_surface_overlap || thin;
 }
 
-/// Cones need landmarks that know their normal; where there are next to none the plain rule speaks.
+/// Cones need landmarks with normals; if there are next to none the plain rule decides.
 bool KeyframeRule::knows_cones() const {
   return options_.rule == KeyframeRuleOptions::Rule::kCone && first_.counts.matched >= kFewNormals;
 }

@@ -11,7 +11,7 @@ namespace {
 using core::KeyframeId;
 using geometry::LineView;
 
-/// Feature `feature` of keyframe `keyframe` and what it says.
+/// Feature `feature` of keyframe `keyframe`, with its measurement.
 struct Candidate {
   maps::Observation observation;
   LineView view;

@@ -19,7 +19,7 @@ Eigen::Vector3d centre(const maps::Map& map, KeyframeId id) {
   return map.camera_from_world(id).inverse().translation;
 }
 
-/// Branch and bound; as many colours as the rest can be painted with bound what it may still add (Tomita and
+/// Branch and bound; the number of colours needed to paint the rest bounds how much it can add (Tomita and
 /// Seki 2003).
 class CliqueSearch {
  public:
@@ -40,7 +40,7 @@ class CliqueSearch {
   }
 
  private:
-  /// `rest`: what is joined with everything in current_.
+  /// `rest`: nodes that are joined with every node in current_.
   void grow(const std::vector<std::size_t>& rest) {
     if (current_.size() > best_.size()) best_ = current_;
     std::vector<std::size_t> order;

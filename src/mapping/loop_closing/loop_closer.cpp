@@ -271,7 +271,7 @@ bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
   if (options_.bundle) {
     GlobalAdjustmentOptions adjustment;
     adjustment.pose_graph = false;               // it is solved
-    adjustment.bundle_options.tolerance = 1e-4;  // the frame waits; later adjustments go on from here
+    adjustment.bundle_options.tolerance = 1e-4;  // the frame waits; later adjustments continue from here
     adjustment.noise.orb_scale_factor = options_.verify.orb_scale_factor;
     counts_.refused += adjust_map(map, {{edges.front().b.robot, camera_}}, believed, adjustment).refused;
   }

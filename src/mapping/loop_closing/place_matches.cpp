@@ -20,7 +20,7 @@ constexpr double kRatio = 0.95;
 // Distance and index in one number: the least is the nearest, the first of them.
 constexpr unsigned kIndexBits = 20;
 
-/// The nearest of a row, and of each column what is nearest so far.
+/// Finds the nearest of a row, and updates the nearest so far of each column.
 PLUMBLINE_CLONES std::uint32_t take_nearest(const int* distances, std::uint32_t count, std::uint32_t row,
                                             std::uint32_t* nearest) {
   std::uint32_t least = std::numeric_limits<std::uint32_t>::max();

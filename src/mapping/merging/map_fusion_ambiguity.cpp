@@ -42,8 +42,8 @@ bool refuted(const OverlayFit& fit, const MapFusionOptions& options) {
   return fit.expected + fit.contradicted >= kFewLandmarks && fit.seen_through() > options.max_seen_through;
 }
 
-/// Landmarks match beyond chance and nothing speaks against it. Not many can: what repeats was seen from
-/// nearer at one end of the step and from afar at the other, and looks little alike then.
+/// True if landmarks match beyond chance and nothing contradicts the alignment. Few can match: repeated
+/// things were seen from near at one end of the step and from afar at the other, and then look little alike.
 bool fits_as_well(const OverlayFit& fit, const OverlayFit& best, const MapFusionOptions& options) {
   constexpr double kSigmas = 2.5;
   constexpr double kLeast = 8.0;
@@ -56,7 +56,7 @@ bool fits_as_well(const OverlayFit& fit, const OverlayFit& best, const MapFusion
 struct Alternative {
   Rigid3 a_from_b;
   Difference apart;
-  int support = 0;  ///< keyframes that speak for it; 0: landmarks alone
+  int support = 0;  ///< keyframes that support it; 0: landmarks alone
   OverlayFit fit;
   bool refuted = false;
 };
@@ -79,8 +79,8 @@ std::vector<Alternative> alternatives(const PartPair& maps, const PairSets& sets
   return result;
 }
 
-/// Held against the maps. Surfaces are tried where landmarks leave it open; what landmarks alone speak for
-/// must show at several spots.
+/// Tests the alignment against the maps. Surfaces are used if landmarks are undecided; an alignment that only
+/// landmarks support must match at several spots.
 void check_against_maps(const MapOverlay& laid, const Rigid3& a_from_b, const OverlayFit& best,
                         const MapFusionOptions& options, Alternative& other) {
   other.fit = laid.fit(other.a_from_b);

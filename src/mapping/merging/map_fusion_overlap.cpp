@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Do two maps show the same place, and how do they lie to each other?
+// Search for places that two maps share, and for the relative pose of the maps.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -163,7 +163,8 @@ std::vector<OverlapFinder::Candidate> OverlapFinder::look_at_all(const std::vect
       const Query& q = queries[first + i];
       scores[i] = database_.query(*parts[q.part].map->keyframe(q.keyframe).features);
     });
-    for (std::size_t i = 0; i < scores.size(); ++i) {  // in order: who looks remembers what it saw
+    for (std::size_t i = 0; i < scores.size();
+         ++i) {  // in order, because recognition depends on earlier queries
       const Query& q = queries[first + i];
       const std::vector<Candidate> found = recognise(scores[i], parts, q.part, q.keyframe, q.before);
       candidates.insert(candidates.end(), found.begin(), found.end());

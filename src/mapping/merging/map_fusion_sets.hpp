@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The steps by which it is decided whether two maps overlap, and how they lie to each other.
+// The steps of deciding whether two maps overlap, and of finding their relative pose.
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -48,8 +48,8 @@ int support(const ConsistentSet& set);
 std::vector<VerifiedPair> verify_neighbours(const PartPair& maps, const PairSets& sets,
                                             const std::vector<VerifiedPair>& known);
 
-/// Holds the alignment, and others that the remaining sets or a step by which things repeat speak for,
-/// against the maps.
+/// Tests the alignment against the maps, together with others that are supported by the remaining sets or by
+/// a step of repetition.
 Ambiguity ambiguity_of(const PartPair& maps, const PairSets& sets, const geometry::Rigid3& a_from_b);
 /// Reason against merging maps of which `agreeing` keyframes agree; empty: there is none.
 std::string objection(const Ambiguity& ambiguity, int agreeing, const MapFusionOptions& options);

@@ -36,8 +36,8 @@ class MapOverlay {
   /// world): what lies behind one another in that direction counts once.
   [[nodiscard]] int matching_spots(const geometry::Rigid3& a_from_b, const Eigen::Vector3d& step) const;
 
-  /// Other ways to overlay b over a, a step of `least_m` or more away from `a_from_b`, that most landmarks
-  /// seen by the keyframes of `pairs` speak for.
+  /// Other ways to overlay b over a, a step of `least_m` or more away from `a_from_b`: those supported by
+  /// most landmarks seen by the keyframes of `pairs`.
   [[nodiscard]] std::vector<geometry::Rigid3> steps(const geometry::Rigid3& a_from_b,
                                                     const std::vector<VerifiedPair>& pairs,
                                                     double least_m) const;

@@ -95,7 +95,7 @@ int MapOverlay::matching_spots(const Rigid3& a_from_b, const Eigen::Vector3d& st
   for (const Eigen::Vector3d& at : in_b) matched.push_back(a_from_b * at);
   const Eigen::Vector3d along = step.normalized();
   for (Eigen::Vector3d& at : matched) at -= along.dot(at) * along;
-  // The fullest spot, then the fullest of what is left.
+  // The fullest spot, then the fullest of the rest.
   for (int spots = 0;; ++spots) {
     std::size_t most = 0;
     Eigen::Vector3d fullest = Eigen::Vector3d::Zero();

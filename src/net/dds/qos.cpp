@@ -42,8 +42,8 @@ Qos status_qos() {
 
 Qos chunk_qos(int most_ms) {
   Qos qos = new_qos();
-  // DDS sends lost fragments again; the robot, which knows what was acknowledged, sends again what was lost
-  // with a link or a process. A writer waits a moment for room, then returns to its loop.
+  // DDS sends lost fragments again; the robot, which knows what was acknowledged, sends again everything that
+  // was lost with a link or a process. A writer waits a moment for space, then returns to its loop.
   dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, DDS_MSECS(most_ms));
   // The store is the history: one in DDS would end with its process and arrive twice.
   dds_qset_durability(qos.get(), DDS_DURABILITY_VOLATILE);

@@ -83,7 +83,7 @@ void HubMeetings::replay() {
   if (std::filesystem::exists(log_file(), ignored)) std::filesystem::resize_file(log_file(), whole, ignored);
 }
 
-/// In the job: makes an entry of what is new in one robot's copy.
+/// In the job: makes an entry of the new rows in one robot's copy.
 void HubMeetings::read_new_rows(const std::string& robot) {
   const std::filesystem::path copy = folder_ / "robots" / robot / "map.db";
   Entry entry{robot, {}};
@@ -99,7 +99,7 @@ void HubMeetings::read_new_rows(const std::string& robot) {
   apply(entry);
 }
 
-/// Before it is applied: what was reported follows from the log.
+/// Called before the entry is applied, so that reports follow from the log.
 core::Result<void> HubMeetings::append_to_log(const Entry& entry) const {
   const core::Bytes packed = core::pack(core::encoded(entry));
   const core::Bytes head = core::encoded(static_cast<std::uint32_t>(packed.size()));

@@ -23,7 +23,7 @@ namespace plumbline::net {
 
 class HubServer {
  public:
-  /// `folder`: holds robots/ and network.db, or will hold them; what is there is continued. Errors (kInput,
+  /// `folder`: holds robots/ and network.db, or will hold them; existing ones are continued. Errors (kInput,
   /// kOutput): it cannot be read or written.
   static core::Result<std::unique_ptr<HubServer>> open(const std::filesystem::path& folder,
                                                        const HubRequest& request, std::unique_ptr<HubBus> bus,

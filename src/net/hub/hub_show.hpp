@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Shows who looks on what comes to a hub: paths, places and clouds of the robots, from the copies of their
-// stores. A job beside the hub's thread.
+// Shows an observer the data that reach a hub: paths, poses and clouds of the robots, from the copies of
+// their stores. A job beside the hub's thread.
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -28,7 +28,7 @@ class HubShow {
 
   /// To be called often.
   void step(const std::map<std::string, RobotSession>& robots, const HubMeetings& meetings);
-  /// Waits for what is under way.
+  /// Waits for the job under way.
   void finish() {
     if (job_.valid()) job_.wait();
   }

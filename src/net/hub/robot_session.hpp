@@ -32,8 +32,8 @@ class Presence {
 
 class RobotSession {
  public:
-  /// `known`: its name, and what is known of it from an earlier process. `file`: of the copy. Errors
-  /// (kOutput): the copy cannot be made.
+  /// `known`: its name, and its state in an earlier process. `file`: of the copy. Errors (kOutput): the copy
+  /// cannot be made.
   static core::Result<RobotSession> open(RobotStatus known, const std::filesystem::path& file,
                                          std::uint64_t quota_bytes);
 

@@ -29,7 +29,7 @@ class HubSession {
   explicit HubSession(core::Log& log) : log_(log) {}
 
   /// Applies a received status; `robot` is this robot's own. True: it is from another hub than before, which
-  /// knows nothing of what was sent.
+  /// has received nothing yet.
   bool apply(const HubStatus& hub, const RobotStatus& robot);
   /// Warns once when no hub has answered for 10 s.
   void report_silence(RobotBus& bus);
@@ -39,7 +39,7 @@ class HubSession {
   [[nodiscard]] Clock::time_point received_at() const { return received_at_; }
   /// The hub is connected and accepts chunks.
   [[nodiscard]] bool accepts() const;
-  /// Without the counts of what was sent.
+  /// Status without the counts of sent data.
   [[nodiscard]] LinkStatus status() const;
 
  private:

@@ -27,8 +27,8 @@ class RobotLink {
   RobotLink(std::unique_ptr<RobotBus> bus, std::string name, std::string fresh,
             std::shared_ptr<mapping::OtherMapsInbox> feedback, core::Log& log);
 
-  /// From now on sends what is or comes to be in `store`; identities are kept in network.db beside it. Errors
-  /// (kOutput): that file cannot be written.
+  /// From now on sends everything in `store`, present and future; identities are kept in network.db beside
+  /// it. Errors (kOutput): that file cannot be written.
   core::Result<void> follow(const std::filesystem::path& store);
   /// The run has ended: the store is in its final folder, and nothing will be added.
   void finish(const std::filesystem::path& store);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The steps from a pipeline file to a Graph, one file each. All of them add to the problems and go on.
+// The steps from a pipeline file to a Graph, one file each. All of them add to the problems and continue.
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -19,7 +19,7 @@ struct StageSpec {
   const core::ConfigNode* body = nullptr;
   std::vector<std::size_t> reads_from;  ///< specs; also where only the port is wrong, for the cycle check
   std::vector<std::string> set;         ///< keys that the command line gave
-  bool dangling = false;  ///< has an input that leads nowhere: what it meant to read is not unused
+  bool dangling = false;                ///< has an input that leads nowhere: the stage it meant is not unused
 };
 using StageSpecs = std::vector<StageSpec>;
 
@@ -35,9 +35,8 @@ std::vector<std::string> names_of(const StageSpecs& specs);
 /// graph_dot.cpp: text between quotation marks, as Graphviz and YAML read it.
 std::string quoted(const std::string& text);
 
-/// graph_include.cpp: the file's tree with the stages and taps of what it includes; marks keep naming the
-/// file that each part stands in. None when too little can be
-/// read to continue.
+/// graph_include.cpp: the file's tree with the stages and taps of the files it includes; marks keep naming
+/// the file that contains each part. None if too little can be read to continue.
 std::optional<core::ConfigNode> with_includes(core::ConfigNode own, const std::filesystem::path& file,
                                               const std::filesystem::path& pipelines_folder,
                                               core::ConfigProblems& problems);

@@ -17,7 +17,7 @@ std::set<std::string> keys_in(const std::string& text) {
   return {std::istream_iterator<std::string>(stream), std::istream_iterator<std::string>()};
 }
 
-/// For those who know what they do.
+/// Options for experts.
 const Keys kAdvanced{
     {"features", keys_in("orb.levels orb.fast_threshold_min orb.min_corner line.min_gradient line.border "
                          "line.max_count line.join line.depth_samples")},

@@ -25,7 +25,8 @@ void flatten(const core::ConfigNode& node, const std::string& path, Values& valu
   for (const auto& [key, value] : node.entries) flatten(value, path.empty() ? key : path + "." + key, values);
 }
 
-/// True for settings that change neither the map nor its files: names, and what is compared by content.
+/// True for settings that change neither the map nor its files: names, and inputs that are compared by
+/// content.
 bool of_no_matter(const std::string& path) {
   for (const char* key :
        {"run.input", "run.pipeline", "run.camera", "run.format", "run.threads", "description"}) {

@@ -30,8 +30,8 @@ struct ResumedRun {
 /// A row as a line of frames.csv.
 std::string to_line(const FrameRow& row);
 
-/// Opens the store of `folder`. None: no keyframe was stored, and what there is was removed. kUsage: it was
-/// begun with another configuration, recording or camera; the message says what differs. kInput: damaged.
+/// Opens the store of `folder`. None: no keyframe was stored, and the store was removed. kUsage: it was made
+/// with another configuration, recording or camera; the message names the difference. kInput: damaged.
 core::Result<std::optional<ResumedRun>> open_resumed(const std::filesystem::path& folder,
                                                      const std::string& configuration,
                                                      const std::string& input,

@@ -23,7 +23,7 @@ std::string found_text(const std::vector<mapping::CameraFinding>& findings) {
   return text;
 }
 
-/// Why typical values in the place of a camera file are no camera; empty: the recording agrees.
+/// Reason why the guessed camera must not be trusted; empty: the recording agrees with it.
 std::string doubt_of(const core::Result<mapping::CameraCalibration>& found) {
   const std::string doubt = "no camera file was given, and the recording cannot confirm the guessed camera: ";
   if (!found) return doubt + found.error().message;

@@ -22,7 +22,7 @@ struct CameraReport {
   std::vector<mapping::CameraFinding> findings;
   double gain = 0.0;  ///< improvement of the fit on parts of the map that it was not estimated from, share
   std::string note;   ///< why the camera was not estimated; empty: it was
-  std::string doubt;  ///< why the camera must not be trusted; empty: nothing speaks against it
+  std::string doubt;  ///< reason not to trust the camera; empty: there is none
   int asked = 0;      ///< number of estimates; the second is of a map made with the result of the first
   std::size_t from_frame = 0;  ///< first frame for which the result is used; 0: all
 };

@@ -23,7 +23,7 @@ class RobotCameras {
   /// `refine`: estimate the cameras. All arguments must outlive this.
   RobotCameras(RobotRecordings& recordings, bool refine, const core::Executor& executor, core::Log& log);
 
-  /// The robots, with each version that their cameras turned out to be.
+  /// The robots, with all refined versions of their cameras.
   [[nodiscard]] const std::vector<RobotInfo>& robots() const { return robots_; }
   /// Each camera as far as it is known now.
   [[nodiscard]] std::vector<sensor::Camera> now() const;

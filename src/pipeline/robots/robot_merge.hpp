@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Maps of several robots as one map result, with what is to be said of it.
+// Maps of several robots as one map result, with its summary.
 #include <memory>
 #include <string>
 #include <vector>

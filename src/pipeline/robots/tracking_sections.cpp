@@ -10,7 +10,7 @@
 namespace plumbline::pipeline {
 namespace {
 
-/// A candidate that was verified: what was found, and why it is no loop.
+/// A verified candidate: its evidence, and the reason if it is not a loop.
 Json section_of(const mapping::LoopTrial& trial) {
   const mapping::PlaceVerification& e = trial.loop.evidence;
   return {{"query", trial.loop.query.index},

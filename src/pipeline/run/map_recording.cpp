@@ -203,7 +203,7 @@ class MapRun {
   MapRun(const MapRequest& request, const core::Executor& executor, core::Log& log)
       : request_(request), executor_(executor), log_(log) {}
 
-  /// Everything is checked, nothing begun.
+  /// Checks everything and starts nothing.
   core::Result<void> open() {
     auto graph = load_pipeline(request_);
     if (!graph) return tl::unexpected(graph.error());

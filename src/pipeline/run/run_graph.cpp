@@ -171,7 +171,7 @@ class Runner {
     look_at_live();
   }
 
-  /// Over frames that the run did which this one goes on from.
+  /// Skips frames that were done by the run which this one continues.
   void skip_done() {
     while (started_ < total_ && context_.resumed != nullptr && context_.resumed->done[started_]) ++started_;
   }

@@ -65,7 +65,7 @@ double tracked_percent(const Json& frames) {
   return all > 0.0 ? 100.0 * frames.at("tracked").get<double>() / all : 0.0;
 }
 
-/// The gravest doubt; of lost frames together with what is mapped apart from the rest.
+/// The gravest doubt; lost frames are reported together with components that stayed apart.
 std::string reason_of(const Graph& graph, const Json& summary) {
   std::vector<Doubt> reasons;
   for (const Node& node : graph.nodes) node.stage->doubt(summary, reasons);

@@ -277,7 +277,7 @@ class OutputStage : public Stage {
     return viz::render_snapshots(scene, snapshots, *context_->executor);
   }
 
-  /// Paths of several robots, and who saw which point.
+  /// Adds the paths of several robots, and the robot that saw each point.
   static void add_robots(const MapResult& map, const DenseCloud& dense, viz::Scene& scene) {
     if (map.robots.size() < 2) return;
     for (const RobotInfo& robot : map.robots) {

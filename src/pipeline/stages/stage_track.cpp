@@ -177,7 +177,7 @@ class TrackStage : public Stage {
     bundle_ms_.back() = static_cast<float>(report.bundle.solve_ms);
   }
 
-  /// For those who look at the maps while they grow: other robots, and the store.
+  /// Adds the map for its readers while it grows: other robots, and the store.
   void add_map(const mapping::Slam& slam, std::size_t number, TrackedFrame& tracked) {
     if (several()) tracked.map = std::make_shared<maps::Map>(slam.map());
     if (!context_->store.keeps_map) return;
@@ -208,7 +208,7 @@ class TrackStage : public Stage {
     return {};
   }
 
-  /// Goes on where another run stopped, with what it knew of the cameras.
+  /// Continues where another run stopped, with the cameras that it had found.
   void restore(const ResumedRun& run) {
     rows_ = run.rows;
     if (run.merged) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Whose camera file it is, and what is checked whosever it is.
+// Detection of a camera file's program, and checks that apply to all programs.
 #include "plumbline/sensor/camera_file.hpp"
 
 #include <fmt/format.h>

@@ -45,7 +45,7 @@ const std::vector<const CameraFormat*>& camera_formats();
 /// A reading that knows nothing yet.
 CameraReading blank_reading(const CameraText& text, const CameraFormat& format);
 
-/// Error (kUsage): place, program, what is wrong, and the lines to write, with what is known filled in.
+/// Error (kUsage): position, program, what is wrong, and the lines to write, with all known values filled in.
 tl::unexpected<core::Error> refuse_camera(const CameraText& text, const CameraFormat& format,
                                           const core::ConfigMark& mark, const std::string& what,
                                           const Camera& known = {});

@@ -77,7 +77,7 @@ bool same_pinhole(const Pinhole& a, const Pinhole& b) {
          a.cy == b.cy;
 }
 
-/// A depth camera of its own where the file has its place too. Returns "" or what is wrong.
+/// Reads a separate depth camera if the file has its pose too. Returns "" or what is wrong.
 std::string take_depth_stream(const RealSenseStreams& found, CameraReading& reading) {
   Pinhole depth;
   Lens lens;

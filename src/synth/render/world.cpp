@@ -38,7 +38,7 @@ World::~World() {
 }
 
 void World::build_bvh() {
-  // No "threads=" here: Embree would hold all of oneTBB in this process to that number for as long as the
+  // No "threads=" here: Embree would limit all of oneTBB in this process to that number for as long as the
   // device lives.
   device_ = rtcNewDevice("set_affinity=0");
   if (device_ == nullptr) throw std::runtime_error("Embree: no device");

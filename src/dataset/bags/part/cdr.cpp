@@ -45,7 +45,7 @@ class CdrSample {
   CdrSample& operator=(const CdrSample&) = delete;
   const Sample* operator->() const { return &sample_; }
 
-  /// "" when the bytes hold such a message, at least at their beginning; else what is wrong.
+  /// Reads a message from the beginning of the bytes. Returns "" or what is wrong.
   std::string read(const std::uint8_t* bytes, std::size_t size) {
     if (size < kEncapsulation) return "is too short for a message";
     if (size > std::numeric_limits<std::uint32_t>::max()) return "is too long for a message";

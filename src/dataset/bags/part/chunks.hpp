@@ -26,7 +26,7 @@ struct Chunk {
 /// Chunks larger than this are refused: one has to be in memory at a time.
 constexpr std::uint64_t kMostChunkBytes = std::uint64_t{1} << 29;
 
-/// The records of a chunk, checked against its CRC; what is wrong with them otherwise.
+/// The records of a chunk, checked against its CRC, or what is wrong with them.
 tl::expected<Bytes, std::string> read_chunk(const BinaryFile& file, const Chunk& chunk);
 
 /// The bytes of a chunk's records one after another; a compressed one is only unpacked as far as needed.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Messages that rosbag2 compressed one by one: frames of zstd in the place of their bytes.
+// Messages that rosbag2 compressed one by one: zstd frames instead of their bytes.
 #include "bags/part/compression.hpp"
 
 namespace plumbline::dataset {
