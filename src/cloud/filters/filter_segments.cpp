@@ -38,7 +38,7 @@ CloudPtr by_segment(const Cloud& input, const std::vector<int>& segments, Mode m
   for (Point& p : output->points) {
     if (!finite(p)) continue;
     const int segment = segments[next++];
-    // Glasbey's colours are told apart easily; the first is black.
+    // Glasbey's colours are easily distinguished; the first is black.
     const auto color = static_cast<std::size_t>(segment + 1) % (pcl::GlasbeyLUT::size() - 1) + 1;
     const pcl::RGB rgb = segment == kNoSegment ? pcl::RGB(128, 128, 128) : pcl::GlasbeyLUT::at(color);
     p.r = rgb.r;
