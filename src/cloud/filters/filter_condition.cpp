@@ -101,10 +101,11 @@ FilterInfo color_filter() {
 
 FilterInfo curvature_filter() {
   return {
-      "curvature", "Keeps points where the surface is as flat, or as curved, as wanted.",
-      "PCL's condition on a field. The curvature is what the filters normals and mls leave: the share of the "
-      "smallest eigenvalue of a neighbourhood's covariance, 0 on a plane, 1/3 where points lie in all "
-      "directions alike. Clouds that no filter has measured have 0; points that could not be measured go.",
+      "curvature", "Keeps points where the curvature of the surface lies within limits.",
+      "PCL's condition on a field. The curvature is that of the filters normals and mls: the share of the "
+      "smallest eigenvalue of a neighbourhood's covariance, 0 on a plane, 1/3 if points lie in all "
+      "directions alike. It is 0 if neither filter was run; points for which it could not be computed are "
+      "removed.",
       "- type: curvature\n  max: 0.02\n", [] { return std::make_unique<CurvatureFilter>(); }};
 }
 

@@ -43,8 +43,8 @@ FilterInfo flying_pixels_filter() {
   return {"flying_pixels", "Removes points at depth jumps of an organised cloud.",
           "At the border of an object a pixel sees foreground and background at once and its depth hangs in "
           "the air between them. Two neighbouring points whose distance along the ray is more than `sigmas` "
-          "times the depth noise plus what a surface at `max_angle` would explain are held to be on "
-          "different surfaces, and both go. Specks with few neighbours go with them.",
+          "times the depth noise plus the difference on a surface at `max_angle` are taken to be on "
+          "different surfaces, and both are removed, with specks that have few neighbours.",
           "- type: flying_pixels\n  sigmas: 4\n  max_angle: 78 deg\n",
           [] { return std::make_unique<FlyingPixelsFilter>(); }};
 }

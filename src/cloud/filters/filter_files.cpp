@@ -91,19 +91,19 @@ class TeeFilter : public Filter {
 }  // namespace
 
 FilterInfo merge_filter() {
-  return {
-      "merge", "Adds the points of another file.",
-      "The points of the file follow those of the chain, as they are: both clouds must be in one frame (put "
-      "transform before it otherwise). Columns that only one of the two has are 0 for the other's points. "
-      "Whole inputs are merged by naming several: `plumbline filter CHAIN "
-      "IN... OUT`. The result is a list, not organised.",
-      "- type: merge\n  file: other.ply\n", [] { return std::make_unique<MergeFilter>(); }};
+  return {"merge", "Adds the points of another file.",
+          "The points of the file are appended to those of the chain, unchanged: both clouds must be in one "
+          "frame (otherwise put transform before it). Columns that only one of the two has are 0 for the "
+          "other's points. "
+          "Whole inputs are merged by naming several: `plumbline filter CHAIN "
+          "IN... OUT`. The result is a list, not organised.",
+          "- type: merge\n  file: other.ply\n", [] { return std::make_unique<MergeFilter>(); }};
 }
 
 FilterInfo tee_filter() {
-  return {"tee", "Writes the cloud as it is at this place of the chain, and passes it on.",
-          "To look at what lies between two filters. Where a pipeline runs the chain once a keyframe, the "
-          "keyframe's number is added to the file's name.",
+  return {"tee", "Writes the cloud at this point of the chain, and passes it on.",
+          "For inspecting the cloud between two filters. If a pipeline runs the chain for every keyframe, "
+          "the keyframe's number is added to the file's name.",
           "- type: tee\n  file: before_smoothing.ply\n", [] { return std::make_unique<TeeFilter>(); }};
 }
 

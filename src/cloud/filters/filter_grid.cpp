@@ -231,9 +231,9 @@ FilterInfo voxel_grid_filter() {
   return {
       "voxel_grid", "Replaces the points of every grid cell by their mean.",
       "PCL's VoxelGrid: positions, normals and colours are averaged; so are the other columns, but a cell "
-      "has the most observations of its points and the robot of the first. Where PCL would warn and hand the "
-      "cloud back unfiltered because the cells cannot be numbered, this is an error that names a leaf size "
-      "which fits.",
+      "has the most observations of its points and the robot of the first. If there are too many cells to "
+      "number, for which PCL would warn and return the cloud unfiltered, the error names a leaf size that "
+      "fits.",
       "- type: voxel_grid\n  leaf: 1 cm\n", [] { return std::make_unique<VoxelGridFilter>(); }};
 }
 

@@ -28,11 +28,11 @@ class IncidenceAngleFilter : public Filter {
 }  // namespace
 
 FilterInfo incidence_angle_filter() {
-  return {
-      "incidence_angle", "Removes points that were seen at a grazing angle.",
-      "Depth of obliquely seen surfaces is noisy and biased. Either side of a surface counts. Points without "
-      "normal go as well unless `keep_unknown` is on.",
-      "- type: incidence_angle\n  max: 75 deg\n", [] { return std::make_unique<IncidenceAngleFilter>(); }};
+  return {"incidence_angle", "Removes points that were seen at a grazing angle.",
+          "Depth of obliquely seen surfaces is noisy and biased. Both sides of a surface count. Points "
+          "without normal are removed as well unless `keep_unknown` is on.",
+          "- type: incidence_angle\n  max: 75 deg\n",
+          [] { return std::make_unique<IncidenceAngleFilter>(); }};
 }
 
 }  // namespace plumbline::cloud

@@ -59,8 +59,8 @@ FilterInfo mls_filter() {
   return {
       "mls", "Smooths the surface: moves every point onto a polynomial fitted to its neighbours.",
       "PCL's MovingLeastSquares, neighbours weighed by a Gaussian as wide as `radius`. Points that have "
-      "fewer than three points within the radius go. Normals and curvature are those of the fitted "
-      "surface; a normal keeps to the side it was on, and turns to the viewpoint when there was none. The "
+      "fewer than three points within the radius are removed. Normals and curvature are those of the fitted "
+      "surface; a normal stays on its side of the surface, or points to the viewpoint if there was none. The "
       "result is a list, not organised.",
       "- type: mls\n  radius: 3 cm\n  order: 2\n", [] { return std::make_unique<MlsFilter>(); }};
 }

@@ -32,13 +32,12 @@ class NormalConsistencyFilter : public Filter {
 }  // namespace
 
 FilterInfo normal_consistency_filter() {
-  return {
-      "normal_consistency", "Removes points whose normal disagrees with those around it.",
-      "Where depth is noisy, at borders and on shiny things, normals point anywhere; a point stays when "
-      "enough of its nearest neighbours have a normal within `max_angle` of its own. Points without normal "
-      "go: put the filter normals before it.",
-      "- type: normal_consistency\n  neighbours: 16\n  max_angle: 30 deg\n  min_share: 30 %\n",
-      [] { return std::make_unique<NormalConsistencyFilter>(); }};
+  return {"normal_consistency", "Removes points whose normal disagrees with those around it.",
+          "Where depth is noisy, at borders and on shiny surfaces, normals point anywhere; a point is kept "
+          "if enough of its nearest neighbours have a normal within `max_angle` of its own. Points without "
+          "normal are removed: put the filter normals before it.",
+          "- type: normal_consistency\n  neighbours: 16\n  max_angle: 30 deg\n  min_share: 30 %\n",
+          [] { return std::make_unique<NormalConsistencyFilter>(); }};
 }
 
 }  // namespace plumbline::cloud

@@ -269,20 +269,21 @@ class ClustersFilter : public Filter {
 
 FilterInfo plane_filter() {
   return {"plane", "Finds the largest planes and keeps, removes or colours their points.",
-          "PCL's SACSegmentation, one plane after the other in what is left; `refine: spread` is the rule of "
+          "PCL's SACSegmentation, one plane after the other among the remaining points; `refine: spread` is "
+          "the rule of "
           "PCL's program pcl_sac_segmentation_plane. The same cloud gives the same planes. Only the points "
-          "themselves count: a plane goes through everything near it, also through furniture that it cuts.",
+          "themselves count: a plane includes everything near it, also furniture that it cuts.",
           "- type: plane\n  distance: 2 cm\n  planes: 2\n  mode: remove\n",
           [] { return std::make_unique<PlaneFilter>(); }};
 }
 
 FilterInfo clusters_filter() {
   return {
-      "clusters", "Finds what hangs together and keeps, removes or colours the largest pieces.",
+      "clusters", "Finds connected clusters and keeps, removes or colours the largest ones.",
       "PCL's EuclideanClusterExtraction: two points are in one cluster when steps of at most `distance` lead "
       "from one to the other. With `leaf` the steps lead over the means of PCL's VoxelGrid, and every point "
       "goes with the mean of its cell: a distance of twice the leaf joins neighbouring cells. `count: 0` "
-      "with `mode: keep` removes what hangs in the air, as `filters/map.yaml` does: pieces of fewer than "
+      "with `mode: keep` removes isolated pieces, as `filters/map.yaml` does: those of fewer than "
       "`min_points` points.",
       "- type: clusters\n  distance: 5 cm\n  min_points: 200\n  count: 1\n  mode: keep\n",
       [] { return std::make_unique<ClustersFilter>(); }};

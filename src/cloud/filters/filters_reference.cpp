@@ -18,9 +18,9 @@ constexpr const char* kIntroduction =
     "leaf: 1 cm\n```\n\n"
     "`plumbline filter CHAIN IN... OUT` runs a chain on files (several inputs are merged), `plumbline "
     "filters list`,\n"
-    "`describe NAME` and `check CHAIN` tell about them; pipelines name chains in the `filters` of their "
-    "stages. Every\n"
-    "filter has a chain that can be run as it is in `pipelines/filters/examples`, by name: `plumbline filter "
+    "`describe NAME` and `check CHAIN` describe and check them; pipelines name chains in the `filters` of "
+    "their stages. Every\n"
+    "filter has an example chain in `pipelines/filters/examples` that can be run by name: `plumbline filter "
     "examples/mls\n"
     "IN OUT`. In the pictures the cloud before the example's last filter is on the left, after it on the "
     "right.\n"
@@ -29,18 +29,17 @@ constexpr const char* kIntroduction =
     "Filters that only choose points keep an organised cloud (one that still has the rows and columns of the "
     "depth\n"
     "picture) organised: rejected points become NaN. The others give a list of points without NaN.\n\n"
-    "What a file knows of its points beside position, normal, colour and curvature goes with them: "
-    "`confidence`,\n"
+    "Further columns of a file besides position, normal, colour and curvature are kept: `confidence`,\n"
     "`observations`, `robot` and columns of other names (`intensity`, `label`; kept as 32 bit floats). "
     "Points that\n"
     "filters choose or move keep theirs; voxel_grid averages; other new points have those of the nearest "
     "point of\n"
     "the filter's input.\n\n"
-    "Coordinates with more digits than a 32 bit float has, such as UTM's, are computed with less whole "
-    "metres (the `shift` that\n"
-    "is told) and written as doubles with them again; options in metres are about the coordinates of the "
+    "Coordinates with more digits than a 32 bit float has, such as UTM's, are reduced by whole metres "
+    "(the `shift` that\n"
+    "is printed) and written as doubles with it again; options in metres refer to the coordinates of the "
     "file. A chain that\n"
-    "leaves no point ends with exit code 4 and names the filter that took the last.\n";
+    "leaves no point ends with exit code 4 and names the filter that removed the last one.\n";
 
 std::string allowed(const core::OptionSpec& option) {
   if (!option.choices.empty()) return fmt::format("{}", fmt::join(option.choices, ", "));
