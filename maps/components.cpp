@@ -25,7 +25,7 @@ std::set<KeyframeId> members(const Map& map, KeyframeId root) {
   return found;
 }
 
-/// Landmarks with what the members see of them; those that none of them sees are left out.
+/// Landmarks with the members' observations of them; landmarks without any are left out.
 template <typename Id, typename Landmark>
 void add_landmarks(const Map& map, const std::vector<Id>& ids, const std::set<KeyframeId>& members,
                    std::vector<Landmark>& parts) {

@@ -31,7 +31,7 @@ KeyframeEdge renamed(KeyframeEdge edge, const RobotNumbers& to) {
   return edge;
 }
 
-/// Appends a map's parts, moved by `world_from_map`. Edges come after those that are there.
+/// Appends a map's parts, moved by `world_from_map`. Its edges are appended to the present ones.
 class PartsCollector {
  public:
   void add(const Map& map, const RobotNumbers& to, const Rigid3& world_from_map) {

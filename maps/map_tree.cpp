@@ -27,7 +27,7 @@ void Map::attach(KeyframeId id) {
 void Map::set_parent(KeyframeId child, KeyframeId parent) {
   KeyframeEntry& entry = keyframes_.at(child);
   KeyframeEntry& above = keyframes_.at(parent);
-  // A keyframe on which nothing hangs can close no longer cycle: the common case costs nothing.
+  // A keyframe without children cannot close a longer cycle, so the common case costs nothing.
   bool cycle = child == parent;
   for (KeyframeId k = parent; !entry.children.empty() && k.valid(); k = keyframes_.at(k).parent) {
     cycle = cycle || k == child;

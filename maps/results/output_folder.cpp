@@ -72,7 +72,8 @@ tl::unexpected<core::Error> another_run(const fs::path& partial) {
       fmt::format("{}: another run is writing there; wait or name another output folder", partial.string()));
 }
 
-/// Removes what an interrupted run left, and nothing else; or only looks whether it is one's.
+/// Removes the remains of an interrupted run, and nothing else; with `takes_over` only checks that they are
+/// such.
 core::Result<void> clear_leftover(const fs::path& partial, bool takes_over) {
   std::error_code ec;
   if (!fs::exists(partial, ec)) return {};

@@ -19,7 +19,7 @@ class MapRows {
   static constexpr const char* kTables[] = {"map",  "keyframe", "state", "point",
                                             "line", "edge",     "frame", "log"};
 
-  /// A row as it is now, unpacked; those of other tables are passed over. Throws BadBytes.
+  /// Applies the present content of a row, unpacked; rows of other tables are skipped. Throws BadBytes.
   void put(const std::string& table, const Key& key, const Bytes& plain,
            const std::vector<RobotInfo>& robots);
   void remove(const std::string& table, const Key& key);

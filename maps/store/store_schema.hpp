@@ -54,7 +54,7 @@ void put_robots(Database& database, std::int64_t transaction, const std::vector<
 void put_camera_versions(Database& database, std::int64_t transaction, const std::vector<RobotInfo>& robots);
 void put_complete(Database& database, std::int64_t transaction, bool complete);
 void put_result_frame(Database& database, std::int64_t transaction, const ResultFrame& frame);
-/// The map's own frame when none was put.
+/// The map's own frame if none was stored.
 ResultFrame read_result_frame(Database& database);
 /// Refuses a path that is not a file, with a better message than SQLite's.
 void check_file(const std::filesystem::path& file);

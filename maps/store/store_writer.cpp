@@ -127,7 +127,7 @@ struct StoreWriter::Impl {
         frame_lists(read_lists<FramePose>(*database, "frame")),
         log_lines(read_lists<std::string>(*database, "log")) {}
 
-  /// The map of a robot beside those of others, or (-1) the only one.
+  /// Writes the map of a robot besides those of others, or (-1) the only one.
   void put_map(const MapChanges& map, std::int32_t robot);
   void mirror_keyframes(const MapChanges& map, std::int32_t robot);
   void mirror_edges(const MapChanges& map, std::int32_t robot);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Points that measured nothing: their coordinates are NaN.
+// Points without a measurement: their coordinates are NaN.
 #include <pcl/point_types.h>
 
 #include <algorithm>

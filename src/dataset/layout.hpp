@@ -111,7 +111,7 @@ bool is_file(const std::filesystem::path& path);
 
 /// A JSON file of at most 64 MB; null when it cannot be read or is no JSON.
 nlohmann::json read_json_file(const std::filesystem::path& file);
-/// The number there; none when it is none, or not finite.
+/// The number under that key; none if it is missing, not a number or not finite.
 std::optional<double> json_number(const nlohmann::json& object, const char* key);
 
 /// world_from_camera from what Apple's ARKit calls the camera's transform: there y points up and the camera

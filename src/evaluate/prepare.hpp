@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Checks and tidies what comes in before it is measured.
+// Checks and cleans the input before it is measured.
 #include <cstdint>
 #include <memory>
 #include <vector>

@@ -44,7 +44,7 @@ std::size_t fitting_ending(const Format& format, const std::string& name) {
   return longest;
 }
 
-/// A format, and what of the map it holds.
+/// A format, and the part of the map that it will hold.
 struct Choice {
   const Format* format = nullptr;
   Content content = Content::kCloud;

@@ -36,7 +36,7 @@ class Cells {
     const int r = std::min(rows_ - 1, corner.y * rows_ / height_);
     return static_cast<std::size_t>(r * columns_ + c);
   }
-  /// Calls what(area) for the areas of the cells that are not `done`, those beside one another as one.
+  /// Calls what(area) for the areas of the cells that are not `done`, adjacent cells as one area.
   template <typename What>
   void for_others(const std::vector<char>& done, const What& what) const {
     const auto is_done = [&](int r, int c) { return done[static_cast<std::size_t>(r * columns_ + c)] != 0; };

@@ -206,7 +206,7 @@ struct Trial {
 };
 
 using Group = std::vector<CameraUnknown>;
-/// Groups of unknowns, the most important first; each has to explain what those before it leave.
+/// Groups of unknowns, the most important first; each has to explain residuals that those before it leave.
 const std::vector<Group>& groups() {
   static const std::vector<Group> all = {
       {optimize::kReadout},          {optimize::kDelay}, {optimize::kSlopeX},

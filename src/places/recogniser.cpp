@@ -37,7 +37,7 @@ std::vector<Candidate> Recogniser::recognise(const Database::Scores& scores, Key
   return seen_in_a_row(query.robot, islands(hits, neighbours));
 }
 
-/// Hits come best first: what lies in the surroundings of a better one belongs to that.
+/// Hits are sorted, best first: a hit in the surroundings of a better one belongs to that one.
 std::vector<Recogniser::Island> Recogniser::islands(const std::vector<Hit>& hits,
                                                     const Neighbours& neighbours) const {
   std::vector<Island> result;

@@ -31,7 +31,7 @@ PLUMBLINE_CLONES void row_to_metres(const std::uint16_t* raw, int count, float s
   }
 }
 
-/// 1 / z = 1 / z_measured + slope . (x, y); what would come to lie behind the camera is no reading.
+/// 1 / z = 1 / z_measured + slope . (x, y); a depth that would lie behind the camera is dropped.
 void correct_slope(const Pinhole& camera, const std::array<double, 2>& slope, cv::Mat& depth) {
   if (slope[0] == 0.0 && slope[1] == 0.0) return;
   for (int v = 0; v < depth.rows; ++v) {

@@ -89,12 +89,12 @@ void add_frames(ReportData& data);
 /// Compares the paths with the truth. Errors (kInput): nothing there fits, or it cannot be compared.
 core::Result<void> add_truth(const std::filesystem::path& truth, ReportData& data);
 
-/// A number of the summary by its place ("/frames/read"); NaN where there is none.
+/// A number of the summary by its JSON pointer ("/frames/read"); NaN if there is none.
 double number_at(const nlohmann::ordered_json& json, const std::string& place);
 /// True if the JSON has `true` at this path.
 bool flag_at(const nlohmann::ordered_json& json, const std::string& place);
 std::string text_at(const nlohmann::ordered_json& json, const std::string& place);
-/// The list at a place; an empty one where there is none.
+/// The list at a JSON pointer; empty if there is none.
 const nlohmann::ordered_json& list_at(const nlohmann::ordered_json& json, const std::string& place);
 
 }  // namespace plumbline::report

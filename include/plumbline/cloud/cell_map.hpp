@@ -53,7 +53,7 @@ struct CellHash {
   }
 };
 
-/// By pack_cell(), or numbers made of it. Its order means nothing: whoever goes over it sorts.
+/// Keyed by pack_cell(), or by numbers made from it. Its order is arbitrary: sort after iterating.
 template <typename T>
 using CellMap = tsl::robin_map<std::uint64_t, T, CellHash>;
 

@@ -22,7 +22,7 @@ struct PlyColumn {
   std::variant<std::vector<float>, std::vector<std::uint8_t>> values;
 };
 
-/// Vertices with named properties, and what connects them.
+/// Vertices with named properties, and the elements that connect them.
 struct PlyData {
   std::vector<PlyColumn> columns;  ///< all of length vertex_count, names unique, in file order
   std::size_t vertex_count = 0;

@@ -145,7 +145,7 @@ class ByteWriter : public Archive<ByteWriter> {
   }
   void check(bool /*holds*/, const char* /*otherwise*/) {}
   void raw(const Bytes& bytes) { bytes_.insert(bytes_.end(), bytes.begin(), bytes.end()); }
-  /// Bytes that end with whatever they are in.
+  /// Bytes up to the end of the enclosing data.
   void rest(const Bytes& bytes) { raw(bytes); }
   [[nodiscard]] const Bytes& bytes() const { return bytes_; }
   void clear() { bytes_.clear(); }

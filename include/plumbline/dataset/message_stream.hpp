@@ -35,7 +35,7 @@ class MessageStream {
   /// type.
   virtual core::Result<void> subscribe(const std::string& topic) = 0;
   virtual void unsubscribe(const std::string& topic) = 0;
-  /// The next message, of whichever topic; none when none comes in time.
+  /// The next message of any topic; none if none arrives in time.
   virtual std::optional<StreamMessage> next(std::chrono::milliseconds most) = 0;
   /// Messages that came too fast for next(), or that the network lost and said so.
   [[nodiscard]] virtual std::size_t lost() const = 0;

@@ -10,7 +10,7 @@
 
 namespace plumbline::exports {
 
-/// By this a page that holds nothing but the viewer is known.
+/// Mark by which a page that holds only the viewer is recognised.
 inline constexpr const char* kViewGenerator = "plumbline view";
 
 struct MapView {

@@ -21,7 +21,7 @@ struct CornerPatch {
   /// From there to what the feature stands for, pixels of the full image: zero for the corner itself; where
   /// a known landmark was aligned, to where that is.
   Eigen::Vector2f offset = Eigen::Vector2f::Zero();
-  /// All zero: none, as at borders of depth (FeatureExtractor): nothing is aligned with it.
+  /// All zero: no patch, as at depth borders (FeatureExtractor); nothing is aligned with it.
   std::array<std::uint8_t, kPixels> gray{};
 
   [[nodiscard]] bool empty() const {

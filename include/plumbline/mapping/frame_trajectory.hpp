@@ -21,7 +21,7 @@ class FrameTrajectory {
   /// The tracker's measurement of a frame, in the map that it was tracked in; for record().
   [[nodiscard]] maps::FramePose measured(const maps::Map& map, double stamp,
                                          const tracking::TrackResult& track) const;
-  /// Adds a frame where it lies in the map as it is now.
+  /// Adds a frame at its pose in the present map.
   void record(const maps::Map& map, const maps::FramePose& frame, core::KeyframeId reference,
               const geometry::Rigid3& camera_from_world);
 

@@ -98,7 +98,7 @@ class Slam {
   using Features = std::shared_ptr<const features::FrameFeatures>;
   /// Frames in order of time. The features are kept when the frame becomes a keyframe.
   FrameReport process(const sensor::RgbdFrame& frame, const Features& features);
-  /// Ends what still runs beside the tracker; call once, after the last frame.
+  /// Ends the background work; call once, after the last frame.
   void finish();
 
   /// All components (maps/components.hpp).

@@ -20,7 +20,7 @@ struct NewestSurface {
   std::shared_ptr<const features::PhotometricImage> image;  ///< null: grey values are not aligned
 };
 
-/// One neighbour that it may be aligned with.
+/// One neighbour as a candidate for alignment.
 struct NeighbourSurface {
   const maps::Keyframe* keyframe = nullptr;  ///< stays in its map until the edges were taken
   geometry::Rigid3 newest_from_keyframe;

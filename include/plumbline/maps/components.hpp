@@ -29,8 +29,8 @@ void move_component(Map& map, core::KeyframeId root, const geometry::Rigid3& new
 /// them are removed, and other edges have no effect. Nothing happens if `first` is a root.
 void split_component(Map& map, core::KeyframeId first);
 
-/// All of the robots' frames, of which those whose reference keyframe is not in `map` are not tracked:
-/// numbers of frames (FrameId) stay.
+/// All of the robots' frames, so that their numbers (FrameId) are kept; those whose reference keyframe is not
+/// in `map` are not tracked.
 [[nodiscard]] std::vector<FramePose> frames_in(const Map& map, std::vector<FramePose> frames);
 
 /// The root of the component in which most frames are tracked; of several the lowest. The map has keyframes.

@@ -122,7 +122,7 @@ struct MapRevision {
   std::uint64_t edges = 0;
 };
 
-/// Landmarks whose ids share a page of IdMap; all that are there, maybe none.
+/// Landmarks whose ids share a page of IdMap; all that exist, possibly none.
 template <typename Landmark>
 struct LandmarkPage {
   std::int32_t robot = 0;

@@ -101,7 +101,7 @@ struct StoreCloud {
 
 /// Additions of a run in one transaction.
 struct StoreStep {
-  /// Robot whose own map this is, beside those of others; -1: the map is the only one, whoever made it.
+  /// Robot whose own map this is, besides those of others; -1: the map is the only one.
   std::int32_t robot = -1;
   std::shared_ptr<const MapChanges> map;  ///< since the last step's of this robot
   std::vector<FramePose> frames;          ///< that came since

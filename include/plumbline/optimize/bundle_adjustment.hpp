@@ -47,8 +47,8 @@ struct BundleLineObservation {
   bool outlier = false;
 };
 
-/// b_from_a was measured; xi = log(b_from_a_estimate * measured^-1) has this information (may be singular:
-/// what the surfaces do not hold stays free).
+/// Measured b_from_a; xi = log(b_from_a_estimate * measured^-1) has this information (it may be singular:
+/// directions that the surfaces do not hold stay free).
 struct BundleEdge {
   int a = -1;
   int b = -1;

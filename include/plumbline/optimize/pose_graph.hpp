@@ -13,8 +13,8 @@
 
 namespace plumbline::optimize {
 
-/// b_from_a was measured: xi = log(b_from_a_estimate * measured^-1), xi = (rho, phi) in metres and radians,
-/// has this information. It may be singular: what the measurement does not hold stays free.
+/// Measured b_from_a: xi = log(b_from_a_estimate * measured^-1), xi = (rho, phi) in metres and radians, has
+/// this information. It may be singular: directions that the measurement does not hold stay free.
 struct GraphEdge {
   int a = -1;
   int b = -1;

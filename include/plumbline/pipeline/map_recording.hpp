@@ -28,7 +28,7 @@ struct MapRequest : RunRequest {
   bool resume = false;              ///< continue an interrupted run from OUT.partial
   /// Highest rate at which each recording is played, frames a second; 0: as fast as possible.
   double pace_hz = 0.0;
-  /// Folder for one picture per frame of what the tracker sees; empty: none.
+  /// Folder for one picture of the tracker's view per frame; empty: none.
   std::filesystem::path debug_video;
   /// Frames that are still arriving, instead of `input`, which is then only a name for the results. Nothing
   /// is resumed. The run ends when they are closed.

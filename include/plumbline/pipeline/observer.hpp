@@ -30,7 +30,7 @@ class RunObserver {
   virtual void processed(const LivePose& /*pose*/) {}
   /// After each keyframe: the poses of all, by stamp.
   virtual void keyframes(std::int32_t /*robot*/, const geometry::Trajectory& /*path*/) {}
-  /// The cloud of a keyframe, in whatever order; points that are not finite are none.
+  /// The cloud of a keyframe, in any order; points that are not finite are to be ignored.
   virtual void added(std::int32_t /*robot*/, double /*stamp*/, const geometry::Rigid3& /*map_from_cloud*/,
                      const cloud::Cloud& /*cloud*/) {}
   /// Called when all is done, with the tracked frames of each robot, by number, and the merged cloud, all in

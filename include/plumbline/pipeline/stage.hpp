@@ -90,7 +90,7 @@ class StageIo {
 
   [[nodiscard]] std::size_t frame() const { return frame_; }  ///< number of the frame within this run
 
-  /// Null when the input is optional and there is nothing.
+  /// Null if the input is optional and has no value.
   template <typename T>
   [[nodiscard]] std::shared_ptr<const T> input(const std::string& name) const {
     return std::static_pointer_cast<const T>(in_[find<T>(inputs_, name)]);
@@ -240,7 +240,7 @@ class Stage {
   [[nodiscard]] virtual bool draws_frames() const { return false; }
   /// True if it can continue an earlier run (RunContext::resumed). Called before the run.
   [[nodiscard]] virtual bool resumes() const { return false; }
-  /// Asked before the run: poses that come with the recording are taken as they are.
+  /// True if poses that come with the recording are used unchanged. Called before the run.
   [[nodiscard]] virtual bool takes_given_poses() const { return false; }
   /// Asked before the run: it begins with finished maps (RunInput::stored_maps).
   [[nodiscard]] virtual bool reads_maps() const { return false; }

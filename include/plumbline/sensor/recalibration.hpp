@@ -21,7 +21,7 @@ class ImageModel {
   [[nodiscard]] Eigen::Vector2d rectified_pixel(const Eigen::Vector2d& lens) const;
   /// Depth (metres, > 0) at a rectified pixel as the depth camera measured it, without its slope taken out.
   [[nodiscard]] double measured_depth(const Eigen::Vector2d& rectified, double depth) const;
-  /// The inverse. 0: it would lie behind the camera.
+  /// The inverse. 0 if the point would lie behind the camera.
   [[nodiscard]] double true_depth(const Eigen::Vector2d& rectified, double measured) const;
 
   [[nodiscard]] const Pinhole& image() const { return image_; }

@@ -48,7 +48,7 @@ class MotionModel {
   [[nodiscard]] bool expired() const { return lost_frames_ >= (knows_odometry() ? 300 : 30); }
   /// Radius of the search for features around their prediction, pixels.
   [[nodiscard]] double search_radius_px() const { return 12.0 + 4.0 * std::min(lost_frames_, 5); }
-  /// True if the motion model may still hold alone what no measurement holds.
+  /// True if the motion model may still hold a direction that no measurement holds.
   [[nodiscard]] bool may_dead_reckon() const {
     return continuous() && dead_reckoning_s_ < (knows_odometry() ? 20.0 : 2.5);
   }

@@ -161,7 +161,7 @@ class Tracker {
 
   [[nodiscard]] TrackResult initialise(const sensor::RgbdFrame& frame, const Features& features);
   [[nodiscard]] TrackResult lost(const sensor::RgbdFrame& frame);
-  /// From where the camera should be by now; none when nothing there can be trusted.
+  /// Tracks from the predicted pose; none if no pose found there can be trusted.
   [[nodiscard]] std::optional<TrackResult> track_with_motion_model(
       const maps::Map& map, const sensor::RgbdFrame& frame, const features::FrameFeatures& features) const;
   /// From what the image looks like; the local map moves there.

@@ -64,8 +64,8 @@ std::string svg_chart(const SvgChart& chart);
 /// CSS rules of all charts of a page.
 std::string svg_chart_style();
 
-/// Charts with title and legend over each, `columns` side by side: what a .svg file holds. It needs no style
-/// but its own, nothing but what any viewer of SVG knows.
+/// Content of a .svg file: charts with title and legend over each, `columns` side by side. It contains its
+/// own style, and only uses what every viewer of SVG supports.
 std::string svg_document(const std::vector<SvgChart>& charts, std::size_t columns);
 
 /// Text for HTML and XML, in attributes too: markup is escaped; invalid UTF-8 and control characters are

@@ -26,8 +26,8 @@ struct CalibrateRequest {
   mapping::CalibrationOptions options;
 };
 
-/// Keyframes close together, whose features lie where the camera showed them: what the shutter does to them
-/// is to be found.
+/// Options for keyframes close together, with features where the camera showed them, because the effect of
+/// the shutter is to be estimated.
 mapping::SlamOptions slam_options() {
   mapping::SlamOptions options;
   options.keyframe.max_frames = 3;

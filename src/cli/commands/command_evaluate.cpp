@@ -37,7 +37,7 @@ std::string estimate_name(const fs::path& file) {
   return file.stem().string();
 }
 
-/// Names of all estimates; where two would be alike, the paths as they were given.
+/// Names of all estimates; the given paths if two would have the same name.
 std::vector<std::string> estimate_names(const std::vector<fs::path>& given) {
   std::vector<std::string> names;
   names.reserve(given.size());

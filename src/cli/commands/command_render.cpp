@@ -51,7 +51,7 @@ core::Result<void> parse_size(const std::string& text, viz::SnapshotOptions& opt
   return {};
 }
 
-/// The map that `input` is, or is map.ply or map.pcd of; none: a cloud by itself.
+/// The map that `input` names, directly or by its map.ply or map.pcd; none: a single cloud.
 core::Result<std::optional<maps::MapPlace>> map_of(const fs::path& input, const std::string& robot) {
   std::error_code ec;
   const std::string name = input.filename().string();

@@ -47,8 +47,8 @@ std::string check_extent(const Cloud& cloud, double leaf) {
       leaf, size.x(), size.y(), size.z(), cells.prod(), needed);
 }
 
-/// Unknown normals become 0, so that they do not spoil the mean normal of their cell. Where all are known, or
-/// none, there is nothing to spoil and nothing is copied.
+/// Replaces unknown normals by 0, so that they do not spoil the mean normal of their cell. If all or none are
+/// known, nothing is copied.
 CloudConstPtr without_unknown_normals(const CloudConstPtr& cloud) {
   std::size_t known = 0;
   std::size_t curved = 0;

@@ -260,7 +260,7 @@ class Fusion {
     }
   }
 
-  /// Weighted covariance of the world positions of what lies in a cell, m^2.
+  /// Weighted covariance of the world positions of points in a cell, m^2.
   struct PoseNoise {
     Eigen::Matrix3f sum = Eigen::Matrix3f::Zero();
     float weight = 0.0F;

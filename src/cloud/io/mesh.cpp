@@ -60,7 +60,7 @@ std::vector<Eigen::Vector3f> vertices_of(const pcl::PolygonMesh& mesh) {
 
 constexpr std::uint32_t kGone = 0xFFFFFFFFU;
 
-/// The triangles none of whose vertices has gone, by the vertices' new numbers.
+/// Triangles of which all vertices are kept, by the vertices' new numbers.
 std::vector<std::array<std::uint32_t, 3>> triangles_of(const pcl::PolygonMesh& mesh,
                                                        const std::vector<std::uint32_t>& number) {
   std::vector<std::array<std::uint32_t, 3>> triangles;

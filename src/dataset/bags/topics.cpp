@@ -133,7 +133,7 @@ core::Result<ChosenTopic> named_image(const BagSurvey& survey, const std::string
   return ChosenTopic{topic, "named by --topic", encoding_of_topic(survey, *topic)};
 }
 
-/// Why there is no image of that kind.
+/// Reason why there is no image of that kind.
 std::string none_of(const BagSurvey& survey, const char* what) {
   for (const SurveyedTopic& topic : survey.topics) {
     const bool image = contains(topic.topic.type, "Image");

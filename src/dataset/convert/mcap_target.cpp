@@ -121,7 +121,7 @@ class McapTarget final : public CopyTarget {
     return pixels->size();
   }
 
-  /// Millimetres as they are; other units as metres, which come back as they were.
+  /// Millimetres unchanged; other units as metres, which are converted back without loss.
   ImageMessage depth_message(const cv::Mat& stored, const MessageHeader& header) {
     cv::Mat depth = stored;
     if (depth.type() == CV_16UC3) cv::extractChannel(depth, depth, 0);

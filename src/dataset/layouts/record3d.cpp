@@ -26,7 +26,7 @@ bool looks_like_record3d(const fs::path& folder) {
   return is_file(place / "metadata.json") && is_folder(place / "rgb") && is_folder(place / "depth");
 }
 
-/// Finite numbers of an array; none when it is another thing or holds one.
+/// Finite numbers of an array; none if it is not an array or holds anything else.
 template <std::size_t kCount>
 std::optional<std::array<double, kCount>> numbers_of_array(const json& array) {
   std::array<double, kCount> numbers{};

@@ -11,7 +11,7 @@
 namespace plumbline::exports {
 namespace {
 
-/// PCD's text holds a colour as one number.
+/// Writes PCD as text, in which a colour is one number.
 core::Result<void> write_ascii_pcd(const std::filesystem::path& output, const cloud::CloudFile& file,
                                    const std::string& frame) {
   core::OutputFile out(output);

@@ -71,8 +71,8 @@ double distance_px(const MapSource& source, const maps::Map& map, const ExportPo
   return (pinhole_of(source, pose.robot).project(at) - seen.pixel.cast<double>()).norm();
 }
 
-/// The sights that fit; what the map's adjustment holds for outliers, other programs would take at their
-/// word.
+/// Keeps the observations that fit: other programs would trust those that the map's adjustment treats as
+/// outliers.
 void keep_what_fits(const MapSource& source, const maps::Map& map, const std::vector<Picture>& pictures,
                     ModelPoint& point) {
   constexpr double kMost_px = 3.0;  // in the picture of the corner's octave

@@ -40,8 +40,8 @@ class MapSource {
   /// The name of the exported map, for titles.
   [[nodiscard]] std::string name() const;
 
-  /// The map's store, for what only it holds; `what`: "free space" and the like, for the message. Errors
-  /// (kInput): there is none, with the way out.
+  /// The map's store, for data that only it holds; `what`: "free space" and the like, for the message. Errors
+  /// (kInput): there is none, with advice.
   [[nodiscard]] core::Result<const maps::StoredResult*> store(const std::string& what) const;
   [[nodiscard]] bool has_store() const { return store_.has_value(); }
   [[nodiscard]] const maps::MapPlace& place() const { return place_; }
@@ -93,7 +93,7 @@ class MapSource {
   double floor_m_ = 0.0;
 };
 
-/// Heights of the floors, lowest first: what faces up and is wide. Empty: none is.
+/// Heights of the floors, lowest first: wide surfaces that face up. Empty: there is none.
 std::vector<double> floor_heights(const cloud::Cloud& cloud);
 
 }  // namespace plumbline::exports

@@ -21,7 +21,7 @@ inline std::size_t stride(std::size_t count, std::size_t most) {
   return std::max<std::size_t>(1, (count + most - 1) / most);
 }
 
-/// Hamming distance of landmarks that may be one.
+/// Largest Hamming distance of landmarks that may be the same.
 constexpr int kAlike = 50;
 inline bool alike(const features::Descriptor256& a, const features::Descriptor256& b) {
   return features::hamming_distance(a, b) <= kAlike;

@@ -51,7 +51,8 @@ optimize::PosePrior weak_prior(const Rigid3& start, const Eigen::Vector3d& middl
   return {start, at_middle.transpose() * at_middle / (hold_m * hold_m)};
 }
 
-/// At the solution with the hold both pull alike: one step on, in what the surfaces hold, is without it.
+/// Removes the prior: at the solution both gradients are equal, so one more step in the directions that the
+/// surfaces hold leads to the solution without it.
 Rigid3 without_prior(const Rigid3& held, const optimize::PosePrior& prior, const Matrix6d& information) {
   // Gradient of the prior.
   const Vector6d pull = prior.information * geometry::log_se3(held * prior.camera_from_world.inverse());

@@ -30,7 +30,7 @@ class HubMeetings {
   void restart();
   /// Reports what a job found and submits the next one; to be called often. True: shared frames have changed.
   bool step();
-  /// Called when nothing more will come: reports all that is left, draws, and removes the log.
+  /// Called at the end: reports all remaining meetings, draws, and removes the log.
   void finish();
   /// Pose of a robot in the frame that it shares with others; empty: it has met no other robot.
   [[nodiscard]] SharedFrame frame(const std::string& robot) const;

@@ -34,7 +34,7 @@ class HubShow {
   }
 
  private:
-  /// A robot of whose map there is more than was shown.
+  /// A robot whose map has grown since it was shown.
   struct Task {
     std::int32_t number = 0;
     std::string name;

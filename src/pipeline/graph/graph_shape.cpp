@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The graph as a whole: order, cycles, sources, what nothing reads from.
+// The graph as a whole: order, cycles, sources, stages that no other one reads from.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 

@@ -28,7 +28,7 @@ Json inputs_schema(const StageType& type) {
   return inputs;
 }
 
-/// A stage that stands alone; of one that changes an included stage nothing is required.
+/// Schema of a stage; one that changes an included stage has no required keys.
 Json stage_body(const StageType& type, bool alone) {
   Json properties;
   properties["type"] = {{"const", type.name}};

@@ -37,7 +37,7 @@ core::Result<std::optional<ResumedRun>> open_resumed(const std::filesystem::path
                                                      const std::string& input,
                                                      const RobotRecordings& recordings);
 
-/// Keyframes in the store of `folder`; 0 when there is none that opens.
+/// Number of keyframes in the store of `folder`; 0 if there is no readable store.
 std::size_t stored_keyframes(const std::filesystem::path& folder);
 
 }  // namespace plumbline::pipeline

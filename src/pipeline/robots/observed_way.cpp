@@ -16,7 +16,7 @@ void ObservedWay::report(std::size_t number, const mapping::Slam& slam, const ma
   if (!component_.valid()) component_ = report.component;
   if (report.component != component_) return;
 
-  // Both ends of a step in the map as it is now: what moved the map in between moves none.
+  // Both ends of a step are in the present map, so that a motion of the map in between does not count.
   const geometry::Rigid3 map_from_camera = *live.world_from_camera;
   odometry_from_camera_ =
       last_ ? odometry_from_camera_ * (pose_of(slam.frame_poses()[*last_]).inverse() * map_from_camera)

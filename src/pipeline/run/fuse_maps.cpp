@@ -12,7 +12,7 @@
 namespace plumbline::pipeline {
 namespace {
 
-/// The same whatever the order in which the maps were named.
+/// Configuration text that does not depend on the order in which the maps were named.
 std::string config_text(const FuseRequest& request, const maps::StoredMaps& maps, const Graph& graph) {
   std::string text =
       fmt::format("# What plumbline {} fused with: plumbline fuse MAP... -p config.yaml\n", core::version());

@@ -246,7 +246,7 @@ class MapRun {
   }
 
  private:
-  /// The folders that are written into, and what lies there already.
+  /// Prepares the output folders, and reads what they contain already.
   core::Result<void> prepare() {
     auto output = maps::OutputFolder::prepare(request_.output, request_.replace, request_.resume);
     if (!output) return tl::unexpected(output.error());

@@ -82,7 +82,7 @@ std::string reason_of(const Graph& graph, const Json& summary) {
   return reason;
 }
 
-/// Frames that came and were mapped, and what became of the others.
+/// Counts of frames that arrived and were mapped, and of the others.
 std::string live_text(const Json& live) {
   const auto count = [&](const char* name) { return live.at(name).get<std::size_t>(); };
   const std::size_t came = count("taken") + count("dropped") + count("stamps_backwards");

@@ -39,7 +39,7 @@ class ReadStage : public Stage {
   }
   [[nodiscard]] std::size_t frames() const override { return source_->size(); }
 
-  /// A frame that cannot be read is skipped: what comes after it need not suffer.
+  /// A frame that cannot be read is skipped; later frames are not affected.
   core::Result<void> process(StageIo& io) override {
     auto frame = source_->read(io.frame());
     if (!frame) {

@@ -97,7 +97,7 @@ class TrackStage : public Stage {
 
   core::Result<void> finish(StageIo& io) override {
     auto result = std::make_shared<RobotMaps>();
-    // Robots take turns; of those that went on from where they were, some were behind others.
+    // Robots take turns, and in a resumed run some were behind others.
     std::sort(rows_.begin(), rows_.end(),
               [](const FrameRow& a, const FrameRow& b) { return a.frame < b.frame; });
     result->frame_columns = (several() ? "robot," : "") + row_column_names();

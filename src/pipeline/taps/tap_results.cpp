@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Taps of what tracking says and of what the end of a run gives.
+// Taps of tracking results and of results at the end of a run.
 #include <fmt/format.h>
 
 #include "plumbline/cloud/cloud_io.hpp"

@@ -52,7 +52,7 @@ tl::unexpected<core::Error> refuse_camera(const CameraText& text, const CameraFo
 
 /// The entry under any of these names, whatever their case; null when there is none.
 const core::ConfigNode* find_any(const core::ConfigNode& map, const std::vector<std::string>& names);
-/// The number there; none when there is no such entry or it is no finite number.
+/// The number there; none if there is no such entry, or it is not a finite number.
 std::optional<double> number_at(const core::ConfigNode& map, const std::vector<std::string>& names);
 std::optional<double> finite_number(const core::ConfigNode& node);
 /// The text there, in lower case; "" when there is none.

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kMostNumbers = 16;
 
-/// All numbers of the file; none where it holds anything else, or more than a matrix has.
+/// All numbers of the file; none if it holds anything else, or more than a matrix has.
 std::optional<std::vector<double>> plain_numbers(const CameraText& text) {
   std::vector<double> numbers;
   for (const CameraLine& line : camera_text_lines(text.text, " \t\r\v\f,;[]()")) {

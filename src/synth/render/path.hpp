@@ -23,7 +23,7 @@ class CameraPath {
   };
   CameraPath(const RobotPath& robot, const Options& options);
 
-  /// t seconds after the start; goes round (closed) or back and forth (open) for ever.
+  /// Pose t seconds after the start; the path is repeated, as a round (closed) or back and forth (open).
   [[nodiscard]] geometry::Rigid3 world_from_camera(double t) const;
   /// Seconds of the path once.
   [[nodiscard]] double duration() const { return duration_; }

@@ -60,7 +60,7 @@ TexelScale texel_scale(const World& world, std::size_t face);
 View look(const World& world, const sensor::Pinhole& camera, const geometry::Rigid3& world_from_camera,
           std::optional<double> time = {});
 
-/// Metres along z of what `ids` names; 0 = nothing.
+/// Depth along z of the faces in `ids`, metres; 0 = nothing.
 cv::Mat1f exact_depth(const View& view);
 
 /// Effects of lens and exposure on light.

@@ -181,7 +181,7 @@ DecodedMessage<float> read_number(const Bytes& bytes) {
   return sample->data;
 }
 
-// Samples to be written borrow what they hold; the stream functions only read it.
+// Samples to be written borrow their texts; the stream functions only read them.
 char* borrowed(const std::string& text) { return const_cast<char*>(text.c_str()); }
 
 dds_sequence_octet borrowed(const Bytes& bytes) {

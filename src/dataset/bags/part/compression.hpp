@@ -22,7 +22,7 @@ class Inflater {
   virtual std::size_t get(std::uint8_t* to, std::size_t size) = 0;
 };
 
-/// Over `size` bytes that must stay; kNone copies.
+/// Inflates `size` bytes, which must outlive it; kNone copies.
 std::unique_ptr<Inflater> make_inflater(Compression compression, const std::uint8_t* data, std::size_t size);
 
 /// At most `most` bytes; empty and false where the data are damaged or hold more.

@@ -79,7 +79,7 @@ class Db3File final : public BagFile {
   Statement read_;
 };
 
-/// Tables are looked at, nothing of them is run: views and triggers of a strange file stay what they are.
+/// Only inspects tables and executes nothing of them, such as views and triggers of a foreign file.
 core::Result<void> Db3File::prepare() {
   sqlite3* const db = database_.get();
   sqlite3_db_config(db, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
@@ -177,7 +177,7 @@ Database open_database(const std::filesystem::path& file, const char* mode) {
 }  // namespace
 
 OpenedBag open_db3(const std::filesystem::path& file, const std::string& shown) {
-  // A journal beside it can only be read where a file may be made beside it; else without the journal.
+  // A journal beside the file can only be read if files may be made beside it; otherwise it is ignored.
   core::Error first;
   std::error_code ignored;
   const bool journal = std::filesystem::exists(file.string() + "-wal", ignored);

@@ -8,7 +8,7 @@ namespace plumbline::dataset {
 
 bool is_mcap(const std::filesystem::path& file);
 
-/// `shown`: what messages call the file. Error (kInput): cannot be read, or is none.
+/// `shown`: name of the file in messages. Error (kInput): cannot be read, or is not MCAP.
 OpenedBag open_mcap(const std::filesystem::path& file, const std::string& shown);
 
 }  // namespace plumbline::dataset
