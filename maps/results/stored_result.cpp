@@ -68,7 +68,7 @@ core::Result<StoredResult> StoredResult::open(const fs::path& store, const std::
   if (!reader) return tl::unexpected(reader.error());
   auto map = reader->load(robot);
   if (!map) return tl::unexpected(map.error());
-  if (roots(map->map).size() > 1) {  // what never joined lies in frames of its own
+  if (roots(map->map).size() > 1) {  // components that never joined have their own frames
     map->map = component(map->map, main_root(map->map, map->frames));
     map->frames = frames_in(map->map, std::move(map->frames));
   }

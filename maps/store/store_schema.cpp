@@ -87,7 +87,7 @@ StoreHeads read_heads(Database& database) {
     std::int64_t& head = heads[table.stream];
     head = std::max(head, last(table.name, ""));
   }
-  heads.map = std::max(heads.map, last("removed", ""));  // clouds stay
+  heads.map = std::max(heads.map, last("removed", ""));  // clouds are never removed
   return heads;
 }
 

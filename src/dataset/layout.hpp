@@ -73,7 +73,7 @@ std::unique_ptr<FrameSource> make_folder_source(std::string name, Layout layout,
 /// One layout: src/dataset/layouts has a source for each. Of some a recording is a file.
 struct LayoutFormat {
   const char* name;        ///< of --format
-  const char* program;     ///< whose it is, for messages
+  const char* program;     ///< program that writes it, for messages
   const char* looked_for;  ///< for messages
   /// Files and folders that must exist; '|' separates alternatives, of which one suffices. A name that ends
   /// in '/' is a folder.

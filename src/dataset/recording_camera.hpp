@@ -13,7 +13,7 @@ namespace plumbline::dataset {
 
 struct ChosenCamera {
   sensor::CameraReading reading;
-  std::string file;        ///< the folder, when its layout says it
+  std::string file;        ///< the folder, if the layout has the camera
   bool of_layout = false;  ///< Layout::camera
 };
 

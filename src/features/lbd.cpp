@@ -16,7 +16,7 @@ constexpr int kBandWidth = 7;  // w, rows
 constexpr int kRows = kBands * kBandWidth;
 constexpr int kMaxColumns = 32;       // samples along a line; longer lines are sampled more sparsely
 constexpr float kRowSpacing = 0.75F;  // px of the half image: the support is 94 px wide in the full one
-constexpr double kBlurSigma = 1.4;    // px of the half image; noise is what costs most recall
+constexpr double kBlurSigma = 1.4;    // px of the half image; noise costs most recall
 constexpr float kClip = 0.4F;         // no single entry may dominate
 constexpr double kDirectionUnit = 4096.0;
 constexpr double kFixed = 65536.0;  // unit of sample places
@@ -207,7 +207,7 @@ void normalise(float* values, std::size_t count) {
 
 // Statistics of band j over its own rows and those of its neighbours; layout: mean[4], deviation[4] per band.
 BandStatistics band_statistics(const RowSums& sums, const Weights& weights) {
-  std::array<std::array<float, 4>, kBands + 2> mean{};  // one band more at each side takes what falls outside
+  std::array<std::array<float, 4>, kBands + 2> mean{};  // one more band at each side for samples outside
   std::array<std::array<float, 4>, kBands + 2> square{};
   for (std::size_t row = 0; row < kRows; ++row) {
     for (std::size_t k = 0; k < 3; ++k) {

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kTolerance = 0.39269908;  // tau, rad: 22.5 degrees
 constexpr float kDensity = 0.7F;           // aligned points per pixel of the rectangle
-constexpr float kRadiusStep = 0.75F;       // by which a region that is too thin is shrunk
+constexpr float kRadiusStep = 0.75F;       // factor by which the radius of a too thin region is reduced
 // 2 / sin(tau): direction certain in spite of quantisation, as published.
 constexpr float kStrongGradient = 5.2F;
 constexpr double kWeakShare = 0.10;  // of the pixels: up to here weaker gradients may join as well

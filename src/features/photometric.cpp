@@ -17,7 +17,7 @@ constexpr int kBorder = 3;  // pixels of a level without samples along the image
 constexpr std::array<int, kPhotometricLevels> kCell{3, 2};
 constexpr float kNearestSample_m = 0.25F;       // metres
 constexpr int kBox = 7;                         // pixels of a level
-constexpr float kHalo = 0.5F + 2 * (kBox / 2);  // how far two such boxes reach
+constexpr float kHalo = 0.5F + 2 * (kBox / 2);  // reach of two such boxes
 
 /// Full pixels of a depth image around one of a level.
 struct Surroundings {

@@ -15,7 +15,7 @@ maps::FramePose FrameTrajectory::measured(const maps::Map& map, double stamp,
   if (!frame.tracked) return frame;
   frame.step_sigma_m = track.sigma_m();
   if (poses_.empty() || !poses_.back().tracked || !track.reference.valid()) return frame;
-  const maps::FramePose& last = poses_.back();  // it lies where its keyframe does now
+  const maps::FramePose& last = poses_.back();  // its pose is relative to its keyframe
   frame.camera_from_previous = track.camera_from_world *
                                (last.camera_from_reference * map.camera_from_world(last.reference)).inverse();
   return frame;

@@ -166,7 +166,7 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& featur
     report.decision.wanted = !track.reference.valid();  // where nothing of this map is seen
     if (!report.decision.wanted)
       report.decision = keyframe_rule_.decide(map_, track, new_keyframes_.empty() && bundle_.idle());
-    if (report.decision.reuse.valid())  // else the map would grow as long as the camera moves
+    if (report.decision.reuse.valid())  // otherwise the map would grow as long as the camera moves
       set_reference(report.reference = report.decision.reuse);
     if (report.decision.wanted) insert_keyframe(frame, features, report);
   }
@@ -446,7 +446,7 @@ std::shared_ptr<const maps::SeenPoints> Slam::seen_points() const {
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t n = i * all / count;
     if (n < track.points.size()) {
-      keep(track.points[n], Eigen::Vector2f::Zero());  // it lies where it was aligned already
+      keep(track.points[n], Eigen::Vector2f::Zero());  // it is at its aligned position already
     } else {
       keep(track.doubtful[n - track.points.size()], track.doubtful[n - track.points.size()].shift);
     }

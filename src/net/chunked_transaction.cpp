@@ -9,7 +9,7 @@
 namespace plumbline::net {
 namespace {
 
-constexpr std::size_t kChunkBytes = 256U << 10U;  // what a bad link carries in a few seconds
+constexpr std::size_t kChunkBytes = 256U << 10U;  // carried by a bad link in a few seconds
 
 std::uint64_t hash_of(const std::uint8_t* bytes, std::size_t size) {
   core::Hash hash;

@@ -16,7 +16,7 @@
 namespace plumbline::optimize {
 namespace {
 
-constexpr double kTolerance = 1e-7;       // of a solve whose weights are decided
+constexpr double kTolerance = 1e-7;       // of a solve with final weights
 constexpr double kRoughTolerance = 1e-2;  // of one on the way there
 constexpr int kRoughIterations = 3;
 constexpr int kMostIterations = 30;   // of each least-squares solve

@@ -14,7 +14,7 @@ using geometry::Rigid3;
 using geometry::Vector6d;
 
 struct NormalEquations {
-  Matrix6d h = Matrix6d::Zero();  ///< lower triangle of what terms add
+  Matrix6d h = Matrix6d::Zero();  ///< lower triangle of the sum over terms
   Vector6d g = Vector6d::Zero();
   double cost = 0.0;
 };

@@ -16,7 +16,7 @@ namespace plumbline::sensor {
 namespace {
 
 constexpr std::uint16_t kNoReading = 0;
-constexpr std::uint16_t kSaturated = 65535;  // what 7-Scenes and some drivers write where there is no depth
+constexpr std::uint16_t kSaturated = 65535;  // written by 7-Scenes and some drivers for missing depth
 
 float metres(std::uint16_t raw, float scale) {
   return raw == kNoReading || raw == kSaturated ? 0.0F : static_cast<float>(raw) / scale;
@@ -103,7 +103,7 @@ struct Rectifier::Maps {
   /// Ray (x, y, 1) of a pixel of a distorted image, and half the size of its square there.
   struct LensRay {
     Eigen::Vector2d ray;
-    Eigen::Vector2d half;  ///< 0: beyond what the lens shows
+    Eigen::Vector2d half;  ///< 0: outside the lens's image
   };
   Camera camera;
   Pinhole target;

@@ -56,7 +56,7 @@ void FrameAligner::align(const AlignmentRound& round) {
   if (round.rematch) match_landmarks(round);  // points and lines, by projection: e_p and e_l of section 3.2
   associate_surface(round);                   // point to plane
   associate_intensity(round);                 // direct alignment
-  solve();                                    // Levenberg-Marquardt over all of them
+  solve();                                    // Levenberg-Marquardt with all families
   constrain_degenerate_directions();          // by the motion prior
   if (round.reject_outliers) reject_outliers();  // chi-square gates
 }

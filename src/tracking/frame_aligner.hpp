@@ -67,7 +67,7 @@ class FrameAligner {
   TrackResult result_;  ///< its camera_from_world is the estimate so far; features: where they were corrected
   std::optional<std::size_t> intensity_level_;  ///< pyramid level of problem_.photometric
   bool use_motion_prior_;
-  bool surface_only_ = false;  ///< nothing else has a say
+  bool surface_only_ = false;  ///< only surfaces constrain the pose
 };
 
 }  // namespace plumbline::tracking

@@ -17,7 +17,8 @@ bool MotionModel::reliable(double stamp) const {
 }
 
 void MotionModel::update(double stamp, const TrackResult& result) {
-  constexpr double kDoubt = 0.75;  // of a change of motion in directions that hardly anything else holds
+  // Share of a change of motion that is ignored in directions that hardly anything else holds.
+  constexpr double kDoubt = 0.75;
   const double dt = stamp - stamp_;
   dead_reckoning_s_ = result.dead_reckoned && valid_ ? dead_reckoning_s_ + dt : 0.0;
   if (continuous() && dt > 1e-4 && dt < 0.5) {

@@ -31,7 +31,7 @@ geometry::Matrix6d projector_onto_degenerate(const PrincipalDirections& directio
 /// Trust in the motion prior.
 enum class MotionTrust {
   kUnknown,  ///< contradicted, or nothing is known of the past: 2 cm, where nothing holds better than that
-  kLikely,   ///< beside features: 5 mm, where they hold no better than that
+  kLikely,   ///< besides features: 5 mm, in directions that they hold no better
   kSurfaceOnly,  ///< beside surfaces alone: 0.3 mm where these hold nothing, so that what uneven normals say
                  ///< does not brake the camera frame by frame
 };

@@ -16,7 +16,7 @@ namespace {
 using geometry::Rigid3;
 
 constexpr double kMinCorrelation = 0.3;  // noise alone has 0.02 of 2000 samples
-constexpr double kMinSigma = 0.3;        // grey values: what rounding leaves
+constexpr double kMinSigma = 0.3;        // grey values: rounding error
 constexpr double kLargestGain = 4.0;
 
 /// core::median() of numbers that are not negative. Their bits are in the same order as they are: most are

@@ -109,7 +109,7 @@ ThumbnailAlignment align_thumbnails(const cv::Mat& previous, const cv::Mat& prev
   if (pixels.size() < 200) return result;
 
   constexpr double kLoss = 8.0;            // grey values
-  constexpr double kIntensitySigma = 4.0;  // what noise and interpolation leave
+  constexpr double kIntensitySigma = 4.0;  // of noise and interpolation
   // Weak belief in the guess: 5 cm, 3 degrees. It holds what the image does not show.
   Vector7d belief;
   belief << 400.0, 400.0, 400.0, 365.0, 365.0, 365.0, 0.0;

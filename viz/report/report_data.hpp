@@ -46,7 +46,7 @@ struct LostStretch {
   double to_s = 0.0;    ///< of the first frame with a pose after it, or of the last one without
   std::size_t lost = 0;
   std::size_t unreadable = 0;
-  double gap_m = 0.0;  ///< between the poses before and after; NaN: one of them is not there
+  double gap_m = 0.0;  ///< between the poses before and after; NaN: one of them is missing
 };
 
 /// Extent of the merged cloud; metres, frame of the results.

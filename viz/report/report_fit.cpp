@@ -28,7 +28,7 @@ MapFit fit_of(const maps::Map& map, const sensor::Pinhole& camera,
   std::vector<double> points, depths, lines;
   for (const core::PointId id : map.point_ids()) {
     const maps::MapPoint& point = map.point(id);
-    if (point.observations.size() < 2) continue;  // lies where the only one saw it
+    if (point.observations.size() < 2) continue;  // fits its only observation exactly
 
     for (const maps::Observation& o : point.observations) {
       const auto& corner = map.keyframe(o.keyframe).features->points[static_cast<std::size_t>(o.feature)];

@@ -23,7 +23,7 @@ namespace plumbline::cloud {
 
 struct DenseFusionOptions {
   VoxelMapOptions voxels;
-  int min_observations = 1;      ///< views that must have seen a voxel for it to stay
+  int min_observations = 1;      ///< smallest number of views of a voxel that is kept
   bool plane_projection = true;  ///< points of flat pieces of surface lie on their plane
   bool free_space = true;        ///< remove points that other views look through
   bool exposure = true;          ///< colours are evened out between views
@@ -53,7 +53,7 @@ inline constexpr const char* kSigmaColumn = "sigma";
 struct FusionViews {
   std::vector<geometry::Rigid3> world_from_camera;
   std::vector<sensor::Pinhole> cameras;  ///< that the clouds were taken with
-  std::vector<std::uint8_t> robots;  ///< whose view it is, 0-254; empty: of one robot, and no columns.robot
+  std::vector<std::uint8_t> robots;  ///< robot of each view, 0-254; empty: one robot, and no columns.robot
   ReadView read;
   /// Covariances of (rho, phi) in Exp(rho, phi) camera_from_world, metres and radians; empty: not known, and
   /// no column of kSigmaColumn.

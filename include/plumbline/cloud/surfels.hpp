@@ -25,7 +25,7 @@ struct Surfel {
   Eigen::Vector3f first{0, 0, 0};  ///< weighted sum of positions
   Eigen::Matrix3f second;          ///< weighted sum of their outer products
   float weight = 0.0F;
-  float variance = 0.0F;  ///< weighted sum of what the sensor's noise explains, m^2
+  float variance = 0.0F;  ///< weighted sum of the sensor's noise variances, m^2
   float scatter = 0.0F;   ///< weighted sum of squared spreads within voxels, m^2
   std::uint32_t points = 0;
 

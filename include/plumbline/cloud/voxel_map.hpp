@@ -36,7 +36,7 @@ struct FusedPoint {
   float noise_m = 0.0F;            ///< standard deviation that the sensor's noise lets one measurement have
   std::uint32_t observations = 0;  ///< views that saw it
   std::uint32_t robot = 0;         ///< that measured it most, 0-254
-  std::uint32_t robot_lead = 0;    ///< by how many measurements it is ahead of all others
+  std::uint32_t robot_lead = 0;    ///< measurements of `robot`, less those of all others
 };
 
 /// A fused cloud, its columns observations and confidence (weight / (weight + 1)), and robot if there are

@@ -50,7 +50,7 @@ struct LiveReport {
   std::size_t dropped = 0;    ///< frames that came while too many waited
   std::size_t backwards = 0;  ///< frames whose stamp was not later than the last one's
   std::size_t unpaired = 0;   ///< images of either kind without one of the other near them
-  std::size_t lost = 0;       ///< messages that the network lost and said so
+  std::size_t lost = 0;       ///< messages that the network reported as lost
 };
 
 /// Read access to one recording. All const methods are thread-safe: frames may be decoded side by side.
@@ -108,7 +108,7 @@ class FrameSource {
 /// Use of the poses that come with a recording.
 enum class PoseUse {
   kPrior,   ///< frames have those of the recorder's own odometry (a phone's): RgbdFrame::odometry
-  kGiven,   ///< they are taken as they are: the pipeline has no tracking
+  kGiven,   ///< they are used unchanged: the pipeline has no tracking
   kIgnore,  ///< for nothing but comparison: truth() has them all the same
 };
 
@@ -129,12 +129,12 @@ struct LiveOptions {
   /// taken.
   std::function<core::Result<std::unique_ptr<MessageStream>>(const std::string& address, TopicNames& topics)>
       open;
-  core::StopToken stop;                      ///< ends the source; what it has given a number is still read
+  core::StopToken stop;                      ///< ends the source; numbered frames are still read
   double for_s = 1e300;                      ///< seconds after which it ends
   std::filesystem::path record;              ///< an MCAP file of the frames that were taken; "": none
   bool replace = false;                      ///< an earlier such file
   std::chrono::milliseconds patience{5000};  ///< until the first image must have come
-  std::size_t most_waiting_bytes = std::size_t{1024} << 20U;  ///< of messages whose turn has not come
+  std::size_t most_waiting_bytes = std::size_t{1024} << 20U;  ///< of waiting messages
 };
 
 struct OpenOptions {

@@ -14,7 +14,7 @@
 namespace plumbline::dataset {
 
 struct PlayOptions {
-  double pace_hz = 0.0;  ///< frames a second; 0: as their stamps say
+  double pace_hz = 0.0;  ///< frames a second; 0: by their stamps
   bool loop = false;     ///< start again after the last frame; stamps continue
   double wait_s = 10.0;  ///< longest wait for a subscriber before the first frame
   core::StopToken stop;

@@ -18,7 +18,7 @@ struct TrajectoryReading {
   std::string format;              ///< "TUM", "EuRoC", "KITTI"
   bool stamped = true;             ///< the file has stamps
   std::vector<double> rows;        ///< stamps of all rows in the file's order, also of those left out
-  std::vector<std::string> notes;  ///< what a reader of the numbers should know, one sentence each
+  std::vector<std::string> notes;  ///< remarks for a reader of the numbers, one sentence each
 };
 
 /// Reads a trajectory of any format, recognised by its rows and its header; a header with column names gives

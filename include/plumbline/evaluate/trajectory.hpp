@@ -19,7 +19,7 @@ namespace plumbline::evaluate {
 enum class TrajectoryAlignment {
   kNone,   ///< compared as they are
   kSe3,    ///< least squares over all matched positions (Horn 1987)
-  kStart,  ///< the first matched pose of the estimate is laid on the truth
+  kStart,  ///< the first matched pose of the estimate is moved onto the truth
 };
 
 struct TrajectoryOptions {

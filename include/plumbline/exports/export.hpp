@@ -34,7 +34,7 @@ struct ExportRequest {
   std::filesystem::path output;       ///< a file, or a folder for the forms that are one
   std::string format;                 ///< name of a Format; empty: by the ending of `output`
   Content content = Content::kCloud;  ///< distinguishes formats with the same ending
-  std::string robot;                  ///< whose map, of an interrupted run of several; empty: the only one
+  std::string robot;  ///< robot whose map is used, of an interrupted run of several; empty: the only one
   /// Recordings for the pictures, in the order of the robots; empty: those that the map was made from.
   std::vector<std::string> recordings;
   OpenRecording open;  ///< null: there are no pictures

@@ -17,7 +17,7 @@ struct CornerPatch {
   static constexpr int kReach = 4;              ///< half width of the aligned area
   static constexpr int kSide = 2 * kReach + 3;  ///< one more on each side, for gradients
   static constexpr int kPixels = kSide * kSide;
-  Eigen::Vector2f middle = Eigen::Vector2f::Zero();  ///< where it was cut out, full image as it was taken
+  Eigen::Vector2f middle = Eigen::Vector2f::Zero();  ///< position at which it was cut out, in the full image
   /// From there to what the feature stands for, pixels of the full image: zero for the corner itself; where
   /// a known landmark was aligned, to where that is.
   Eigen::Vector2f offset = Eigen::Vector2f::Zero();

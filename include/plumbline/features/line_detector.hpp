@@ -25,7 +25,7 @@ struct LineDetectorOptions {
   double min_gradient = 3.0;
   double min_length_px = 25.0;
   double border_px = 4.0;
-  bool border_either = false;  ///< lines with one end in that margin go too, not those along a side alone
+  bool border_either = false;  ///< also drop lines with one end in that margin, not only those along a side
   bool exact_nfa = false;      ///< LSD's number of false alarms by its sum, not by a bound
   int max_count = 0;
   bool join = true;

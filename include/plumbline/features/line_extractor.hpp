@@ -16,7 +16,7 @@ namespace plumbline::features {
 struct LineFeature {
   LineSegment segment;
   LineDescriptor descriptor{};
-  std::optional<Line3> line3;  ///< none where depth does not support one 3D line: the line stays 2D
+  std::optional<Line3> line3;  ///< none if depth does not support one 3D line: the line stays 2D
 };
 
 struct LineOptions {

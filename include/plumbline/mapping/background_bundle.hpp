@@ -17,10 +17,10 @@ namespace plumbline::mapping {
 
 /// Report of one adjustment; the times are for people, nothing is decided by them.
 struct BundleReport {
-  core::KeyframeId keyframe;  ///< around which; invalid: nothing was put back
+  core::KeyframeId keyframe;  ///< keyframe in its centre; invalid: nothing was put back
   optimize::BundleSummary summary;
-  std::optional<Contradiction> refused;  ///< why it was not put back
-  double wait_ms = 0.0;                  ///< how long the tracker had to wait for it
+  std::optional<Contradiction> refused;  ///< reason for not putting it back
+  double wait_ms = 0.0;                  ///< waiting time of the tracker
   double solve_ms = 0.0;                 ///< wall time of the adjustment
 };
 
@@ -53,7 +53,7 @@ class BackgroundBundle {
     LocalBundle bundle;
     optimize::BundleSummary summary;
     double solve_ms = 0.0;
-    core::Executor::Job job;  ///< last: done before the rest goes
+    core::Executor::Job job;  ///< last: its destructor waits before the rest is destroyed
   };
   void begin(const maps::Map& map, std::int64_t frame);
 

@@ -78,7 +78,7 @@ struct SigmaFactors {
 struct GlobalAdjustmentOptions {
   bool pose_graph = true;  ///< before bundle adjustment, when there are edges besides the map's own
   bool bundle = true;
-  int observations = 250;  ///< points and lines that a keyframe is tied with at most; those seen most often
+  int observations = 250;  ///< largest number of points and lines per keyframe; those seen most often
   ObservationNoise noise;
   double surface_weight = 0.3;  ///< of the map's surface edges: their samples are alike from one to the next
   /// Standard deviations. Where a tracker slid along a wall, it is the landmarks of that moment that agree on
@@ -106,7 +106,7 @@ struct GlobalAdjustmentSummary {
   bool changed = false;  ///< the map was moved
   int refused = 0;       ///< solutions that contradicted what the tracker had measured
   std::string refusal;   ///< connection that the last of these would have torn
-  std::string message;   ///< why not, or what the solver said
+  std::string message;   ///< reason for no change, or the solver's message
 };
 
 /// Edges that are not rejected by the pose graph's verdicts; all of them if there are no verdicts.

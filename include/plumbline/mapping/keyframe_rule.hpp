@@ -33,7 +33,8 @@ struct KeyframeRuleOptions {
   int cone_min_lines = 15;
   double cone_min_change_rad = 0.1745;
   Balance cone_balance = Balance::kAbove;
-  bool cone_scaled = false;  ///< thresholds follow what a scene has, and balance is waited for six frames
+  /// Thresholds are relative to the scene, and the rule waits six frames for balance.
+  bool cone_scaled = false;
   double cone_epsilon = 1.0;
   void declare(core::OptionTable& table);
 };
@@ -61,7 +62,7 @@ struct KeyframeDecision {
   ConeTerms cone;
   bool wanted = false;
   bool urgent = false;                         ///< tracking is about to be lost
-  KeyframeCause cause = KeyframeCause::kNone;  ///< of those that are wanted
+  KeyframeCause cause = KeyframeCause::kNone;  ///< cause of a wanted keyframe
   core::KeyframeId reuse;  ///< instead of a new keyframe this one becomes the reference again; invalid: none
 };
 
@@ -106,7 +107,7 @@ class KeyframeRule {
     ConeCounts counts;
   };
   First first_;
-  int unbalanced_ = 0;  ///< candidates whose changes sufficed, but not their balance, since the keyframe
+  int unbalanced_ = 0;  ///< candidates since the keyframe with enough changes but no balance
 };
 
 }  // namespace plumbline::mapping

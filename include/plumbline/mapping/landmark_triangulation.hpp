@@ -19,10 +19,10 @@ struct TriangulationOptions {
   double max_relative_sigma = 0.1;  ///< standard deviation of the depth over the depth
   double max_depth_m = 40.0;
   double min_line_angle_rad = 0.03;  ///< between the interpretation planes that differ most
-  int min_line_views = 3;      ///< two planes always meet: only a third one can say that they should not
-  double max_angle_rad = 0.5;  ///< between orientations after the roll between the images is undone
-  double scale_factor = 1.2;   ///< of the ORB pyramid
-  double aligned = 0.3;        ///< standard deviation of aligned corners, over that of others
+  int min_line_views = 3;            ///< two planes always intersect: only a third view can contradict them
+  double max_angle_rad = 0.5;        ///< between orientations after the roll between the images is undone
+  double scale_factor = 1.2;         ///< of the ORB pyramid
+  double aligned = 0.3;              ///< standard deviation of aligned corners, over that of others
 
   void declare(core::OptionTable& table);
 };
@@ -30,7 +30,7 @@ struct TriangulationOptions {
 /// Image in which the newest keyframe's corners are aligned.
 struct NewestImage {
   const std::vector<cv::Mat>& levels;  ///< the newest keyframe's image in each octave
-  features::FrameFeatures& newest;     ///< its features, those that the map holds
+  features::FrameFeatures& newest;     ///< its features, as held by the map
 };
 
 /// Triangulates corners of `keyframe` that see no landmark and have no depth (0, or beyond `max_measured_m`)

@@ -32,7 +32,7 @@ struct LocalMapperOptions {
   FusionOptions fusion;
   bool bundle = true;
   int bundle_keyframes = 12;
-  ObservationNoise bundle_noise;  ///< but for the scale factor, which is the tracker's
+  ObservationNoise bundle_noise;  ///< without the scale factor, which is the tracker's
   bool edges = true;
   int edge_keyframes = 5;
   bool edge_photometric = true;

@@ -29,7 +29,7 @@ struct LoopOptions {
   bool enabled = true;
   double min_gap_s = 3.0;        ///< keyframes made within this time are the present, not a loop
   int agreeing = 2;              ///< verified keyframes, following one another, that must be consistent
-  double max_alternative = 0.5;  ///< another consistent set may have this share of them at most
+  double max_alternative = 0.5;  ///< largest share of them that another consistent set may have
   ConsistencyOptions consistency;
   /// Largest correction by a loop, as a share of the distance travelled since the match: what looks alike
   /// further off (doors of a corridor) is another place.

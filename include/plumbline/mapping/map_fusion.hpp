@@ -145,7 +145,7 @@ struct MergeEvidence {
   CrossValidation validation;
   std::vector<VerifiedPair> pairs;           ///< all that agree
   int rejected = 0;                          ///< of these, rejected by the pose graph of all maps
-  std::map<std::string, int> refused_pairs;  ///< why pairs were refused, and how many
+  std::map<std::string, int> refused_pairs;  ///< number of refused pairs by reason
   bool accepted = false;
   std::string refused;  ///< why not; empty when accepted
   [[nodiscard]] PairTotals totals() const;

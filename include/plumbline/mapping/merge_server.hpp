@@ -37,8 +37,8 @@ struct MeetingEvent {
 
 /// Pose of a robot in the frame that it shares with others.
 struct RobotPlace {
-  std::size_t anchor = 0;  ///< the robot whose world is the common frame: the first of those that met
-  geometry::Rigid3 anchor_from_robot;   ///< worlds
+  std::size_t anchor = 0;              ///< robot whose world is the common frame: the first of those that met
+  geometry::Rigid3 anchor_from_robot;  ///< worlds
   geometry::Rigid3 anchor_from_camera;  ///< of the newest keyframe
   /// Covariance of that camera's position (metres) and rotation (radians), from the merges between it and the
   /// anchor, in the anchor's axes; drift of the robots' own maps is not in it.
@@ -114,7 +114,7 @@ class MergeServer {
   std::vector<std::optional<RobotPlace>> places_;
   bool busy_ = false;
   std::int64_t due_ = 0;
-  core::Executor::Job job_;  ///< last: done before the rest goes
+  core::Executor::Job job_;  ///< last: its destructor waits before the rest is destroyed
 };
 
 }  // namespace plumbline::mapping

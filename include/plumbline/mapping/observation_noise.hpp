@@ -13,10 +13,10 @@ namespace plumbline::mapping {
 
 struct ObservationNoise {
   double orb_scale_factor = 1.2;  ///< from octave to octave; corners are good to a pixel of theirs
-  double aligned = 0.3;           ///< to so much of it where they were aligned (maps::Observation)
+  double aligned = 0.3;           ///< factor on it for aligned corners (maps::Observation)
   double line_sigma_px = 0.25;    ///< of a line's ends, across it
   double depth_factor = 2.0;      ///< of the depth noise, for the depth of corners and lines
-  bool depth_rows = true;         ///< off: corners and lines say nothing but where they are in the image
+  bool depth_rows = true;         ///< off: only image positions of corners and lines are used
   /// rad/s. Images taken while turning are distorted by the rolling shutter of common sensors, and their
   /// depth is stamped apart: what they say counts for half at this rate and fades with the fourth power of
   /// it.

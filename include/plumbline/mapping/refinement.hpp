@@ -14,7 +14,7 @@ namespace plumbline::mapping {
 struct RefinementOptions {
   bool icp = true;       ///< align local maps that overlap
   bool adjust = true;    ///< anything at all
-  bool accuracy = true;  ///< find out how exactly keyframes are known
+  bool accuracy = true;  ///< compute the accuracy of keyframes
   LocalMapOptions local_maps;
   PairOptions pairs;
   AlignmentOptions alignment;

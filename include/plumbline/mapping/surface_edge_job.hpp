@@ -22,7 +22,7 @@ struct NewestSurface {
 
 /// One neighbour as a candidate for alignment.
 struct NeighbourSurface {
-  const maps::Keyframe* keyframe = nullptr;  ///< stays in its map until the edges were taken
+  const maps::Keyframe* keyframe = nullptr;  ///< must stay in its map until the edges are taken
   geometry::Rigid3 newest_from_keyframe;
   std::shared_ptr<const features::PhotometricSamples> grey;  ///< null: none are known
 };
@@ -50,7 +50,7 @@ class SurfaceEdgeJob {
   static void measure(State& state);
 
   std::unique_ptr<State> state_;
-  core::Executor::Job job_;  ///< last: done before the rest goes
+  core::Executor::Job job_;  ///< last: its destructor waits before the rest is destroyed
 };
 
 }  // namespace plumbline::mapping

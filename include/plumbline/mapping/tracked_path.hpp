@@ -18,7 +18,7 @@ using KeyframePoses = std::vector<std::pair<core::KeyframeId, geometry::Rigid3>>
 struct Contradiction {
   core::KeyframeId a;
   core::KeyframeId b;
-  double off_m = 0.0;  ///< from what the tracker measured between them
+  double off_m = 0.0;  ///< difference from the tracker's measurement
   double off_rad = 0.0;
   [[nodiscard]] std::string text() const;
 };

@@ -22,7 +22,7 @@ double viewing_angle(const Eigen::Vector3d& point, const Eigen::Vector3d& normal
 struct ConeCounts {
   int matched = 0;  ///< M: landmarks matched that know their normal
   int all = 0;      ///< A: all points of the frame
-  int changed = 0;  ///< D: of M, those whose zone is another one than at the keyframe
+  int changed = 0;  ///< D: those of M whose zone has changed since the keyframe
 };
 
 struct ConeThreshold {

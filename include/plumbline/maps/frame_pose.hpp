@@ -54,7 +54,7 @@ struct PathStep {
 };
 
 struct PathCheck {
-  double largest_m = 0.0;  ///< by how much a step differs at most from the tracker's
+  double largest_m = 0.0;  ///< largest difference between a step and the tracker's
   double largest_rad = 0.0;
   std::vector<PathStep> tears;  ///< beyond noise: 5 cm or 3 degrees, and 4 standard deviations
 };
@@ -84,7 +84,7 @@ geometry::Trajectory keyframe_trajectory(const Map& map);  ///< by id
 
 struct MapPoses {
   geometry::Trajectory trajectory;      ///< tracked frames only
-  std::vector<FrameId> trajectory_ids;  ///< whose poses these are
+  std::vector<FrameId> trajectory_ids;  ///< frames of the trajectory's poses
   std::vector<KeyframePose> keyframes;  ///< by id
 };
 

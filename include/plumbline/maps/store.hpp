@@ -36,8 +36,8 @@ struct CameraVersion {
 struct RobotInfo {
   std::int32_t number = 0;  ///< in the map's ids
   std::string name;
-  sensor::Camera camera;                     ///< as it was given
-  std::vector<CameraVersion> versions = {};  ///< in order; empty: it is as it was given
+  sensor::Camera camera;                     ///< the given one
+  std::vector<CameraVersion> versions = {};  ///< refined versions in order; empty: none
 };
 
 /// Header of a store, written once when it is made.
@@ -62,7 +62,7 @@ struct ResultFrame {
 struct StoredMap {
   StoreHeader header;
   bool complete = false;    ///< save_final was the last thing that happened
-  std::int32_t robot = -1;  ///< whose own map this is; -1: the map is the only one
+  std::int32_t robot = -1;  ///< robot whose own map this is; -1: the map is the only one
   Map map;
   std::vector<FramePose> frames;  ///< by robot, in order
   std::vector<std::string> log;   ///< a line a frame of the run, as frames.csv has it, by robot
@@ -93,7 +93,7 @@ struct StoredSurface {
 
 /// A cloud on its way into a store: bytes of cloud::encode_cloud.
 struct StoreCloud {
-  KeyframeId keyframe;  ///< whose cloud it is; invalid: a frame's
+  KeyframeId keyframe;  ///< keyframe of the cloud; invalid: it is a frame's
   FrameId frame;        ///< of a frame between keyframes
   std::shared_ptr<const std::vector<std::uint8_t>> bytes;
   std::shared_ptr<const StoredSurface> surface = nullptr;  ///< of a keyframe's cloud; null: none is kept

@@ -24,7 +24,7 @@ struct StoredViews;
 struct MapPlace {
   std::optional<ResultFolder> result;  ///< of a run that came to its end
   std::filesystem::path store;  ///< its map.db, or that of a run that was interrupted; empty: there is none
-  std::string robot = {};       ///< whose map, if those of several robots are not merged yet
+  std::string robot = {};       ///< robot whose map it is, if those of several are not merged yet
 };
 
 /// `input`: a result folder, map.db itself, or OUT where a run was interrupted and left OUT.partial. Errors

@@ -68,7 +68,7 @@ struct BundleProblem {
 
 struct BundleOptions {
   int max_iterations = 8;     ///< of each round
-  int rounds = 2;             ///< after each, outliers are put aside and the solve is repeated
+  int rounds = 2;             ///< after each, outliers are removed and the solve is repeated
   double tolerance = 1e-5;    ///< a round ends with an iteration that lowers the cost by a smaller share
   double first_radius = 1e4;  ///< of the trust region: a first step is damped by 1 over it, as Ceres does
   double point_loss = 2.45;   ///< Huber, standard deviations

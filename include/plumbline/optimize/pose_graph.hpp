@@ -32,7 +32,7 @@ struct PoseGraph {
 struct EdgeVerdict {
   double chi2 = 0.0;    ///< squared error at the solution, in variances, whether the edge counted or not
   int dimensions = 0;   ///< directions the edge holds: rank of its information
-  double weight = 1.0;  ///< 1: counts; 0: put aside
+  double weight = 1.0;  ///< 1: used; 0: rejected
   bool rejected = false;
 };
 

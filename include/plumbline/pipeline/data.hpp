@@ -39,7 +39,7 @@ struct FrameRow {
 struct TrackedFrame {
   std::int32_t robot = 0;
   core::KeyframeId keyframe;  ///< valid when this frame became a keyframe
-  maps::FrameId frame;        ///< its place on the robot's way; invalid: it lies nowhere
+  maps::FrameId frame;        ///< its number on the robot's path; invalid: it has no pose
   double stamp = 0.0;         ///< seconds
   FrameRow row;
   geometry::Rigid3 depth_from_camera;   ///< motion between the stamps of colour and depth
@@ -48,7 +48,7 @@ struct TrackedFrame {
   std::optional<geometry::Rigid3> map_from_camera;
   /// Changes of the map since the last keyframe; with each keyframe, if some stage keeps the map.
   std::shared_ptr<const maps::MapChanges> changes;
-  std::shared_ptr<const maps::Map> map;  ///< of several robots: as it is with this keyframe
+  std::shared_ptr<const maps::Map> map;  ///< for several robots: the map at this keyframe
   /// With a keyframe, when the robot's camera became another since the last one: all robots. Null: none did.
   std::shared_ptr<const std::vector<RobotInfo>> robots;
 };
@@ -91,7 +91,7 @@ struct KeyframeCloud {
   core::KeyframeId id;    ///< not valid: a frame between keyframes
   maps::FrameId frame;    ///< as TrackedFrame
   double stamp = 0.0;     ///< seconds
-  cloud::CloudPtr cloud;  ///< null: what `compact` holds, not decoded
+  cloud::CloudPtr cloud;  ///< null: the content of `compact` is not decoded
   /// The cloud as encoded by cloud::encode_cloud; null: it waits in a store.
   std::shared_ptr<const std::vector<std::uint8_t>> compact;
   std::function<core::Result<std::vector<std::uint8_t>>()> stored;  ///< reads it there

@@ -18,7 +18,7 @@ namespace plumbline::pipeline {
 struct FuseRequest : RunRequest {
   FuseRequest() { pipeline = "fuse"; }
   std::vector<std::filesystem::path> maps;  ///< result folders, or files map.db
-  std::string anchor;                       ///< robot or map whose frame all are laid into; empty: by content
+  std::string anchor;                       ///< robot or map that defines the common frame; empty: by content
 };
 
 /// The result does not depend on the order of `maps`; a single one is refined and fused. Errors as

@@ -125,11 +125,11 @@ constexpr std::size_t kMostUnderWay = 64;
 
 /// Input of a run.
 struct RunInput {
-  const dataset::FrameSource* source = nullptr;          ///< what a read stage reads; null: there is none
+  const dataset::FrameSource* source = nullptr;          ///< input of a read stage; null: there is none
   RobotRecordings* recordings = nullptr;                 ///< `source`, when recordings are mapped; else null
-  const maps::StoredMaps* stored_maps = nullptr;         ///< what a maps stage reads; null: there is none
+  const maps::StoredMaps* stored_maps = nullptr;         ///< input of a maps stage; null: there is none
   const std::vector<maps::RobotInfo>* robots = nullptr;  ///< of recordings or maps, by number
-  std::string anchor;  ///< robot whose frame finished maps are laid into; empty: any
+  std::string anchor;  ///< robot that defines the common frame of finished maps; empty: any
   std::string text;    ///< text that identifies what is mapped
 };
 
@@ -157,7 +157,7 @@ struct RunContext {
   core::StopToken stop;
   std::filesystem::path output_folder;  ///< where sinks write
   RunInput input;
-  const ResumedRun* resumed = nullptr;  ///< what an earlier run did already; null: nothing
+  const ResumedRun* resumed = nullptr;  ///< results of the resumed run; null: none
   RunStore store;
   RunHooks hooks;
 };
@@ -192,7 +192,7 @@ struct StageTiming {
 struct CheckContext {
   std::filesystem::path pipeline_folder;           ///< of the pipeline file
   std::filesystem::path pipelines_folder;          ///< shipped pipelines, filters and cameras
-  const cloud::FilterRegistry* filters = nullptr;  ///< what filter chains may name
+  const cloud::FilterRegistry* filters = nullptr;  ///< filters that chains may contain
 
   /// A file named in a pipeline: absolute, beside the pipeline file, or shipped. Empty when there is none.
   [[nodiscard]] std::filesystem::path find(const std::string& file) const;

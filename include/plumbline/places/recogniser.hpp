@@ -18,7 +18,7 @@ struct RecogniserOptions {
   double min_absolute = 0.015;
   int consistent = 3;  ///< keyframes in a row that must see the same surroundings
   int hits = 30;       ///< best keyframes that are looked at
-  bool votes = false;  ///< these are those that share most words (section 4.2), not those of the best scores
+  bool votes = false;  ///< candidates share most words (section 4.2) instead of having the best scores
   int groups = 3;      ///< candidates at most
   void declare(core::OptionTable& table);
 };

@@ -17,7 +17,7 @@ struct ReportRequest {
   std::filesystem::path result;  ///< folder of map or fuse
   std::filesystem::path output;  ///< empty: report.html in the folder
   std::filesystem::path truth;   ///< empty: none. A recording, a folder of recordings by robot, or a TUM file
-  std::filesystem::path other;   ///< empty: none. A second result, laid over the map to walk through
+  std::filesystem::path other;   ///< a second result, shown over the map to walk through; empty: none
   std::size_t points = 1500000;  ///< of the map to walk through, at most, thinned by voxels; 0: all
   bool replace = false;          ///< an earlier report, and nothing else, may be replaced
 };
@@ -25,7 +25,7 @@ struct ReportRequest {
 struct ReportSummary {
   std::filesystem::path file;
   std::uint64_t bytes = 0;
-  std::vector<std::string> missing;  ///< what the page lacks, and why; one line each
+  std::vector<std::string> missing;  ///< missing parts of the page, with reasons; one line each
 };
 
 /// Writes the page: one file that holds its pictures and needs nothing else, the same bytes for the same

@@ -15,10 +15,10 @@ namespace plumbline::sensor {
 /// Content of a camera file.
 struct CameraReading {
   Camera camera;
-  std::string program;             ///< whose kind of file it is; "" is our own
+  std::string program;             ///< program that the format is from; "" is our own
   bool has_size = true;            ///< else color.width and color.height are 0: taken from the images
   bool has_depth_scale = true;     ///< else depth_scale is only a default: taken from the layout
-  std::vector<std::string> notes;  ///< what was decided or converted while reading, one phrase each
+  std::vector<std::string> notes;  ///< decisions and conversions while reading, one phrase each
 };
 
 /// Reads a camera file of any known program, recognised by its content. Pixel coordinates are ours: (0, 0) is

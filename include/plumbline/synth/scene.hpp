@@ -48,7 +48,7 @@ struct Lamp {
   Eigen::Vector3d center;
   Eigen::Vector3d half_u;
   Eigen::Vector3d half_v;
-  Eigen::Vector3d normal;  ///< unit, where the light goes
+  Eigen::Vector3d normal;  ///< unit, direction of the light
   double power = 1.0;
 };
 
@@ -90,7 +90,7 @@ struct Scene {
   double ambient = 0.35;              ///< share of light without direction
   Motion motion = Motion::kHandheld;  ///< when the options do not choose
   std::vector<RobotPath> robots;      ///< at least one
-  std::vector<Walker> walkers;        ///< as many of them are about as the options say
+  std::vector<Walker> walkers;        ///< the options say how many of them are filmed
   std::vector<Event> events;
 };
 

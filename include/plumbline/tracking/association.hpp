@@ -32,7 +32,7 @@ struct AssociationOptions {
   double scale_factor = 1.2;  ///< of the ORB pyramid
   double max_point_angle_rad = 0.6;
   bool align = true;           ///< matched corners with their landmark's patch (align_points)
-  double aligned_sigma = 0.3;  ///< standard deviation of those, over that of others
+  double aligned_sigma = 0.3;  ///< standard deviation of aligned corners, relative to others
   int max_line_hamming = 90;
   double max_line_angle_rad = 0.2;
   double min_line_ratio = 0.0;  ///< of the lengths of a predicted and a measured line

@@ -17,8 +17,8 @@ struct WorldSurface {
 };
 
 struct LocalMapOptions {
-  int keyframes = 12;         ///< whose landmarks are tracked
-  int surface_keyframes = 4;  ///< whose surfaces are aligned to
+  int keyframes = 12;         ///< number of keyframes whose landmarks are tracked
+  int surface_keyframes = 4;  ///< number of keyframes whose surfaces are used
   double voxel_m = 0.03;      ///< surface samples of all these are fused within
   double overlap_angle_rad = 0.6;
   void declare(core::OptionTable& table);

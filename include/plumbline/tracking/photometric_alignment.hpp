@@ -70,8 +70,9 @@ struct ShiftedPose {
 ShiftedPose search_shift(const optimize::PhotometricFamily& family,
                          const geometry::Rigid3& camera_from_world);
 
-constexpr double kGoodAgreement = 0.8;     ///< correlation of grey values at a guess that needs no search
-constexpr double kBetterAgreement = 0.05;  ///< by so much another guess must agree better to be tried first
+constexpr double kGoodAgreement = 0.8;  ///< correlation of grey values at a guess that needs no search
+/// Advantage in agreement that another guess needs to be tried first.
+constexpr double kBetterAgreement = 0.05;
 /// Which of some hypotheses to try first, by how well grey values agree at each (correlation; none: nothing
 /// that can be compared is in view from there). The first, unless another agrees better; one of which nothing
 /// is known gives way to a good one only. `agreement` must not be empty.

@@ -39,7 +39,7 @@ struct TrackerOptions {
   bool photometric = true;
   bool align_stamps = true;
   bool thumbnails = true;    ///< search for the pose with small images
-  bool motion_prior = true;  ///< the motion model holds what measurements leave open
+  bool motion_prior = true;  ///< the motion model holds directions that measurements leave free
   bool pnp_start = false;  ///< every frame begins with PnP, where there are matches enough (METHOD section 2)
   /// Time from the first to the last row of an image, s; 0: all at once. The shear is corrected before a
   /// frame is tracked (features::undo_rolling_shutter), by the motion model, and again by the motion that was
@@ -156,7 +156,7 @@ class Tracker {
   struct PlaceHypothesis {
     core::KeyframeId keyframe;
     geometry::Rigid3 camera_from_world;
-    bool coarse = false;  ///< only the thumbnail says so
+    bool coarse = false;  ///< supported by the thumbnail only
   };
 
   [[nodiscard]] TrackResult initialise(const sensor::RgbdFrame& frame, const Features& features);

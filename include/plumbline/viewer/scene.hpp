@@ -16,7 +16,7 @@ namespace plumbline::viewer {
 enum class Scale {
   kLinear,       ///< from `low` to `high`
   kLogarithmic,  ///< the same, by the logarithm; 0 < low
-  kCategory,     ///< whole numbers that `names` tells the meaning of
+  kCategory,     ///< whole numbers, with their meanings in `names`
   kView          ///< whole numbers: the keyframe (its place in Scene::keyframes) that saw the point best
 };
 

@@ -23,7 +23,7 @@ class MlsFilter : public Filter {
     pcl::Indices indices;
     const CloudPtr output = (*pcl)->moving_least_squares(points, radius_m_, order_, indices);
     const Eigen::Vector3f viewpoint = viewpoint_of(*input, context);
-    std::vector<std::size_t> sources;  // of the points that stay
+    std::vector<std::size_t> sources;  // of the kept points
     for (std::size_t i = 0; i < output->size(); ++i) {
       const auto source = static_cast<std::size_t>(indices[i]);
       turn((*output)[i], (*points)[source], viewpoint);

@@ -273,7 +273,7 @@ class Fusion {
   std::vector<FusionTile> tiles_;
   std::vector<DepthRaster> rasters_;         ///< by view; empty ones without free space
   std::vector<std::uint8_t> is_depth_view_;  ///< by view
-  std::vector<Eigen::Vector3f> gains_;       ///< by view; empty: colours as they are
+  std::vector<Eigen::Vector3f> gains_;       ///< by view; empty: colours are not changed
   CellMap<PoseNoise> pose_noise_;            ///< by cell; empty: not known
 };
 

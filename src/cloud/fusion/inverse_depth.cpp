@@ -9,7 +9,7 @@ namespace {
 
 constexpr float kSigmas = 3.0F;          // neighbours within this much noise are the same surface
 constexpr float kSmoothTangent = 1.73F;  // up to 60 degrees from face on are smoothed over the whole window
-constexpr float kLinkTangent = 3.73F;    // up to 75 degrees the surface is held to go on
+constexpr float kLinkTangent = 3.73F;    // up to 75 degrees the surface is assumed to continue
 constexpr float kCreaseSigmas = 4.0F;
 
 /// Adds a pair of opposite neighbours to sum and count where both lie on the surface of `reference`, cell by

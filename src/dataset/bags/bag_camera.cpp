@@ -16,7 +16,7 @@ namespace {
 using geometry::Rigid3;
 
 constexpr double kMillimetres = 1000.0;  // units per metre of ROS' 16-bit depth
-constexpr double kNothing = 1e-9;        // of a transform that only goes through quaternions
+constexpr double kNothing = 1e-9;        // rounding error of a transform through quaternions
 const char* const kRealSenseImage = "/image/data";
 
 /// frame names with and without the slash that ROS 1 had in front.

@@ -42,7 +42,7 @@ struct BagSurvey {
   std::vector<std::shared_ptr<const BagFile>> files;
   std::vector<SurveyedTopic> topics;  ///< by name
   std::vector<std::string> notes;
-  std::string camera_yaml;  ///< what `plumbline convert` left there; "" if nothing
+  std::string camera_yaml;  ///< camera file that `plumbline convert` stored there; "": none
 
   [[nodiscard]] const SurveyedTopic* find(const std::string& name) const;
   /// The first message of a topic; errors name bag and topic.

@@ -12,7 +12,7 @@ namespace plumbline::exports {
 /// Input for making an OctoMap.
 struct OctreeWork {
   double resolution_m = 0.05;
-  bool color = false;  ///< ColorOcTree with probabilities (.ot), else the binary OcTree (.bt)
+  bool color = false;  ///< true: ColorOcTree with probabilities (.ot); false: the binary OcTree (.bt)
   std::string frame;   ///< for the file's comment, one line
   const cloud::CloudFile* cloud = nullptr;
   Eigen::AlignedBox3d box;

@@ -132,7 +132,7 @@ core::Result<std::vector<ModelPoint>> landmark_points(MapSource& source,
       const auto picture = picture_of.find(observation.keyframe);
       if (picture != picture_of.end()) point.track.push_back({picture->second, observation.feature});
     }
-    const bool seen = point.track.size() >= 2;  // else the model has not enough of its keyframes
+    const bool seen = point.track.size() >= 2;  // otherwise the model has too few of its keyframes
     keep_what_fits(source, map, pictures, point);
     if (seen && point.track.size() < 2) continue;
     if (!seen) point.track.clear();

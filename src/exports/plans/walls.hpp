@@ -42,7 +42,7 @@ struct WallDoor {
 /// A room whose walls meet all round.
 struct WallRoom {
   std::vector<Eigen::Vector2d> outline;  ///< counter-clockwise
-  double area_m2 = 0.0;                  ///< less what stands in it from floor to ceiling
+  double area_m2 = 0.0;                  ///< without objects from floor to ceiling
   Eigen::Vector2d label = Eigen::Vector2d::Zero();
 };
 
@@ -50,7 +50,7 @@ struct WallPlan {
   std::vector<WallLine> walls;
   std::vector<WallDoor> doors;
   std::vector<WallRoom> rooms;
-  bool rays_known = false;  ///< else doors are those below a lintel only
+  bool rays_known = false;  ///< false: only doors below a lintel are found
 };
 
 /// Finds the walls of the selected part of a map at --cut over its floor. Errors (kInput): no normals, no

@@ -176,7 +176,7 @@ core::Result<void> MapSource::select() {
     floor_m_ = 0.0;
   }
   if (o.storey < 0) return {};
-  constexpr double kBelow_m = 0.2;  // what belongs to the storey's own floor
+  constexpr double kBelow_m = 0.2;  // points this far below belong to the storey's own floor
   if (auto up = need_upright("--storey"); !up) return up;
   const auto cloud = whole_cloud();
   if (!cloud) return tl::unexpected(cloud.error());

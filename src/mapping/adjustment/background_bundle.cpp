@@ -42,7 +42,7 @@ std::optional<MapCorrection> BackgroundBundle::commit(maps::Map& map, std::int64
   const auto start = Clock::now();
   if (!running_->job.ready()) running_->job.wait();
   report.wait_ms = ms_since(start);
-  running_->job.wait();  // no longer a wait, but what the work threw is thrown here
+  running_->job.wait();  // does not wait any more, but rethrows errors of the job
   const std::unique_ptr<Running> done = std::move(running_);
   report.keyframe = done->keyframe;
   report.summary = done->summary;

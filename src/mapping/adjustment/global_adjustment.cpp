@@ -173,7 +173,7 @@ KeyframePoses poses_of(const MapBundle& bundle) {
 }
 
 void put_back(const MapBundle& bundle, maps::Map& map) {
-  move_keyframes(map, poses_of(bundle));  // and with them what the bundle left out
+  move_keyframes(map, poses_of(bundle));  // landmarks left out of the bundle move along
   put_back_landmarks(bundle, map);
   drop_outliers(bundle, map);
 }

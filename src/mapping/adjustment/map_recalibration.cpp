@@ -20,7 +20,7 @@ using geometry::Rigid3;
 using geometry::Vector6d;
 
 constexpr double kNearest_m = 0.1;
-constexpr std::size_t kSamples = 240;  // of what a keyframe saw, for relative poses
+constexpr std::size_t kSamples = 240;  // surface samples of a keyframe for relative poses
 constexpr std::size_t kLeastSamples = 20;
 
 /// Effect of a camera change on one image.

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kDepthIsBack = 50;     // corners with depth
 constexpr double kWellWithin = 0.8;  // of the limits: otherwise the next frame would trigger again
-constexpr int kFewNormals = 10;      // landmarks: fewer say nothing about cones
+constexpr int kFewNormals = 10;      // landmarks; fewer are not enough for cones
 
 struct ViewOverlap {
   double overlap = 1.0;

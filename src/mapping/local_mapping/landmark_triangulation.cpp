@@ -144,7 +144,7 @@ class PairSearch {
 
 struct Meeting {
   Eigen::Vector3d point;                 ///< in the newest camera's frame
-  std::optional<Eigen::Vector2f> shift;  ///< px, of the newest corner to what the older one shows
+  std::optional<Eigen::Vector2f> shift;  ///< px, from the newest corner to the older one's patch
 };
 
 /// Intersection of two corners' rays. Corners as they are detected need a long baseline for it; the newest

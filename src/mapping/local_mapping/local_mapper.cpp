@@ -76,7 +76,7 @@ core::KeyframeId LocalMapper::insert(maps::Map& map, const sensor::RgbdFrame& fr
   add_lines(map, id);
   if (!begins_component) map.attach(id);
   if (options_.triangulate && !distorted(map, id)) triangulate(map, id, {levels, *own});
-  own->slants = {};  // corners stay where they are from here on
+  own->slants = {};  // corners do not move from here on
   return id;
 }
 

@@ -15,7 +15,7 @@ using geometry::Rigid3;
 namespace {
 
 constexpr int kIndexedAtATime = 8;          // keyframes: the frame waits
-constexpr std::size_t kVerifiedOthers = 3;  // of those that look alike
+constexpr std::size_t kVerifiedOthers = 3;  // look-alikes to verify
 constexpr int kSharedAtMost = 5;            // landmarks: more are the same surroundings, no loop
 
 Matrix6d seen_from(const Matrix6d& covariance, const Rigid3& by) {

@@ -121,7 +121,7 @@ std::string LoopCloser::judge(const maps::Map& map, LoopTrial& trial) const {
   const PlaceVerification& evidence = trial.loop.evidence;
   if (evidence.ransac_inliers == 0) return evidence.refused;
   const bool same_robot = trial.loop.match.robot == trial.loop.query.robot;
-  if (same_robot) measure_correction(map, trial);  // else nothing is known of how they lie
+  if (same_robot) measure_correction(map, trial);  // otherwise their relative pose is not known
   if (!evidence.accepted) return evidence.refused;
   const double allowed_m = options_.max_drift * trial.path_m;
   if (trial.correction_m > kAlways_m + allowed_m ||

@@ -30,7 +30,7 @@ SurfaceVotes vote_surface(const std::vector<maps::SurfaceSample>& samples,
                           const geometry::Rigid3& other_from_own, const cv::Mat& other_depth,
                           const sensor::Pinhole& other_camera) {
   constexpr int kMinNeighbours = 7;  // of 9 small pixels
-  constexpr double kMaxDepth = 5.0;  // m; beyond, noise hides what could be seen
+  constexpr double kMaxDepth = 5.0;  // m; noise is too large beyond
   SurfaceVotes votes;
   if (other_depth.empty()) return votes;
   const double scale_x = static_cast<double>(other_depth.cols) / other_camera.width;

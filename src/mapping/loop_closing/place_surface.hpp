@@ -14,7 +14,7 @@ namespace plumbline::mapping {
 struct SurfaceVotes {
   int confirmed = 0;
   int contradicted = 0;  ///< the other camera saw something clearly behind the sample
-  int hidden = 0;        ///< behind what the other camera saw: says nothing
+  int hidden = 0;        ///< behind the other camera's surface: no evidence
   SurfaceVotes& operator+=(const SurfaceVotes& o);
   [[nodiscard]] double overlap() const;        ///< confirmed, of all in view
   [[nodiscard]] double contradiction() const;  ///< contradicted, of those not hidden

@@ -13,7 +13,7 @@ namespace {
 
 using geometry::Rigid3;
 
-constexpr double kApart_m = 1.0;     // another place: more than maps drift within what they share
+constexpr double kApart_m = 1.0;     // another place: more than the drift of maps within their overlap
 constexpr double kTurned_rad = 0.3;  // ... or so far turned
 constexpr int kFewLandmarks = 30;    // too few for a decision
 constexpr double kWrong = 0.2;       // share of landmarks seen through where maps do not belong together

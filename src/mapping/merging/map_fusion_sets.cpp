@@ -43,7 +43,7 @@ Rigid3 worlds(const maps::Map& a, const maps::Map& b, const PlacePair& pair) {
 Alignment mean_alignment(const PartPair& maps, const std::vector<PlacePair>& pairs) {
   constexpr int kRounds = 20;
   constexpr double kHuber_m = 0.03;
-  constexpr double kArm_m = 1.0;      // radians count as what they move at this distance
+  constexpr double kArm_m = 1.0;      // radians count as the motion at this distance
   constexpr double kFloor_m = 0.002;  // pairs of one place share their errors
   constexpr double kFloor_rad = 0.001;
   Alignment mean;

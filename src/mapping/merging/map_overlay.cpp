@@ -16,7 +16,7 @@ using geometry::Rigid3;
 constexpr double kReach_m = 0.12;  // landmarks that are one may lie so far apart
 constexpr double kCell_m = 2.0 * kReach_m;
 constexpr std::size_t kMostTried = 6000;
-constexpr double kNear_m = 0.4;  // what depth is believed
+constexpr double kNear_m = 0.4;  // range of trusted depth
 constexpr double kFar_m = 5.0;
 
 enum class Seen { kNot, kThere, kThrough };

@@ -32,7 +32,7 @@ struct ComponentFate {
   std::size_t keyframes = 0;
   bool joined = false;     ///< it is part of the result
   double joined_s = -1.0;  ///< of the recording, when that was found out while mapping; negative: at the end
-  int agreeing = 0;        ///< keyframes that say so
+  int agreeing = 0;        ///< keyframes that agree
   std::string why_not;     ///< empty: joined
 };
 Json section_of(const ComponentFate& component);

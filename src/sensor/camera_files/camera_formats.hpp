@@ -23,7 +23,7 @@ struct CameraText {
 
 struct CameraFormat {
   const char* program;
-  bool structured;  ///< recognised by names, so that it is found among other files
+  bool structured;  ///< recognised by its keys, so that it is found among other files
   bool (*recognises)(const CameraText& text);
   /// The size is 0 and has_size, has_depth_scale false where the file does not say.
   core::Result<CameraReading> (*read)(const CameraText& text);

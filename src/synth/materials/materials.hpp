@@ -22,7 +22,7 @@ struct Material {
   std::string_view name;
   DrawTexture* draw;
   float red, green, blue;  ///< mean reflectance, 0-1
-  double tile_m;           ///< one copy of the texture covers so much
+  double tile_m;           ///< edge length of one copy of the texture
   int pixels;              ///< edge of the texture image
   float infrared;          ///< reflectance for the depth sensor, 0-1; under 0.1 measurements fail
   float gloss;             ///< 0 matt - 1 mirror: glints blind the depth sensor, grazing rays glance off

@@ -20,7 +20,7 @@ struct Device {
   float step;            ///< px of disparity
   float wander;          ///< px that borders wander to and fro
   float flying;          ///< share of border pixels that float between front and back
-  float fixed_share;     ///< share of the noise variance that stays while the picture does not change
+  float fixed_share;     ///< share of the noise variance that is fixed while the picture does not change
   /// The depth camera sees less than the colour camera it is registered to: shares of width (left, right) and
   /// height (top, bottom) without depth.
   float left, right, top, bottom;

@@ -59,7 +59,7 @@ class World {
     std::size_t count = 0;
   };
 
-  Scene scene;  ///< and behind its own faces those of the walkers
+  Scene scene;  ///< its own faces, then those of the walkers
   SynthOptions options;
   std::size_t fixed_faces = 0;  ///< the scene's own; only these are cast against
   std::vector<Mover> movers;

@@ -38,7 +38,7 @@ class Ros1Fields {
   }
   MessageHeader header() {
     MessageHeader header;
-    number<std::uint32_t>();  // how many there were before
+    number<std::uint32_t>();  // sequence number
     header.stamp_ns = time();
     header.frame_id = text();
     return header;
