@@ -88,13 +88,13 @@ void LineDetectorOptions::declare(core::OptionTable& table) {
                "Resolution of edge detection; positions are refined at full resolution in any case");
   table.number("line.min_gradient", min_gradient, {0.5, 100.0}, "",
                "LSD: weakest gradient, grey levels per pixel of the detection image; below 5.2 only where "
-               "strong ones are few");
+               "there are few strong ones");
   table.number("line.min_length", min_length_px, {5.0, 1000.0}, "px", "Smallest length of a line");
   table.number("line.border", border_px, {0.0, 100.0}, "px",
                "Drop lines that run within this margin of a side");
-  table.boolean("line.border_either", border_either,
-                "Lines with one end within that margin are dropped, too");
-  table.boolean("line.exact_nfa", exact_nfa, "LSD: number of false alarms by its sum, not by a bound");
+  table.boolean("line.border_either", border_either, "Also drop lines with one end within that margin");
+  table.boolean("line.exact_nfa", exact_nfa,
+                "LSD: compute the number of false alarms by its sum, not by a bound");
   table.integer("line.max_count", max_count, {0, 10000}, "",
                 "Largest number of lines, the longest ones; 0: all");
   table.boolean("line.join", join, "Join collinear pieces and drop near-duplicates");

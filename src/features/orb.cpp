@@ -189,11 +189,11 @@ void OrbOptions::declare(core::OptionTable& table) {
   table.integer("orb.levels", levels, {1, 12}, "", "Pyramid levels");
   table.integer("orb.fast_threshold", fast_threshold, {1, 200}, "", "FAST threshold, grey values");
   table.integer("orb.fast_threshold_min", fast_threshold_min, {1, 200}, "",
-                "FAST threshold in cells of the image that have no corner otherwise");
+                "FAST threshold in cells of the image that would have no corner");
   table.number("orb.min_corner", min_corner, {0.0, 1.0}, "",
-               "Drop corners on edges: those whose squared gradient across the main direction is below this "
-               "share of that along it; 0: none");
-  table.boolean("orb.spread", spread, "Points evenly over the image; off: the strongest, wherever they are");
+               "Drop corners on edges, whose squared gradient across the main direction is below this share "
+               "of that along it; 0: none");
+  table.boolean("orb.spread", spread, "Spread points evenly over the image; off: take the strongest");
 }
 
 OrbExtractor::OrbExtractor(const OrbOptions& options) : options_(options) {

@@ -382,10 +382,10 @@ core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRu
     const auto evidence = evidence_of(parts, change, executor);
     const bool few = keyframes < kLeastKeyframes && result.views < kLeastViewsInAll;
     if (!evidence || few || result.observations < kLeastObservations) {
-      return core::input_error(fmt::format(
-          "{} views with {} observations of shared points are too few to estimate the camera from; "
-          "film a place with texture for 10 s or more while turning and moving the camera",
-          result.views, result.observations));
+      return core::input_error(
+          fmt::format("{} views with {} observations of shared points are too few to estimate the camera; "
+                      "film a place with texture for 10 s or more while turning and moving the camera",
+                      result.views, result.observations));
     }
     const CameraChange before = std::exchange(change, calibrator.choose(*evidence, result));
     if (calibrator.same(before, change)) break;

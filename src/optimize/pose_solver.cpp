@@ -189,7 +189,7 @@ FamilySummary summarise(const std::vector<double>& squared) {
 void PoseSolverOptions::declare(core::OptionTable& table) {
   table.number("solver.point_weight", point_weight, {0.0, 100.0}, "", "Weight of all points together");
   table.number("solver.line_weight", line_weight, {0.0, 100.0}, "", "Weight of all lines together");
-  table.boolean("solver.depth_rows", depth_rows, "Points are held by their depth, too");
+  table.boolean("solver.depth_rows", depth_rows, "Use the depth of points, too");
   table.number("solver.plane_weight", plane_weight, {0.0, 100.0}, "", "Weight of all depth samples together");
   table.number("solver.photometric_weight", photometric_weight, {0.0, 100.0}, "",
                "Weight of all grey values together");

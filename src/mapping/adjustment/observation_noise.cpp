@@ -13,9 +13,9 @@ void ObservationNoise::declare(core::OptionTable& table, const std::string& pref
   table.number(prefix + "line_sigma", line_sigma_px, {0.01, 10.0}, "px",
                "Standard deviation of a line's ends across it");
   table.number(prefix + "depth_factor", depth_factor, {0.1, 100.0}, "",
-               "Factor on the noise of landmarks' depth, whose errors are alike in neighbouring views");
+               "Factor on the noise of landmarks' depth, whose errors are correlated in neighbouring views");
   table.boolean(prefix + "depth_rows", depth_rows,
-                "The depth of corners and lines, beside where they are in the image");
+                "Use the depth of corners and lines, in addition to their image positions");
   table.number(prefix + "turn_rate", turn_rate, {0.01, 1000.0}, "rad/s",
                "Turn rate of the camera at which an image's observations count for half");
 }

@@ -42,7 +42,7 @@ void count(const GlobalAdjustmentSummary& adjusted, RefinementSummary& counts) {
 
 void tell(const GlobalAdjustmentSummary& adjusted, std::size_t edges, core::Log& log) {
   if (adjusted.refused > 0) log.warning("refine: not put into the map: " + adjusted.refusal);
-  if (!adjusted.changed) log.warning("refine: the map stays as it is: " + adjusted.message);
+  if (!adjusted.changed) log.warning("refine: the map is not changed: " + adjusted.message);
   log.debug(
       fmt::format("refine: {} keyframes, {} points, {} lines, {} surface edges, {} alignments and loops; "
                   "{} iterations; moved by {:.1f} mm on average, {:.1f} mm at most",

@@ -74,7 +74,7 @@ void KeyframeRuleOptions::declare(core::OptionTable& table) {
   table.number("keyframe.max_rotation", max_rotation_rad, {0.01, 3.0}, "rad",
                "Make a keyframe when rotation exceeds this");
   table.integer("keyframe.min_features", min_features, {0, 10000}, "",
-                "With fewer tracked features a keyframe is urgent, if the image has more");
+                "Number of tracked features below which a keyframe is urgent, if the image has more");
   table.boolean("keyframe.reuse", reuse,
                 "Plain rule: return to an older keyframe that serves as well instead of making another");
   table.integer("keyframe.cone_max_wait", cone_patience, {0, 10000}, "",
@@ -90,15 +90,14 @@ void KeyframeRuleOptions::declare(core::OptionTable& table) {
       "Cone rule: points whose viewing angle changed by more than this must be spread over the image");
   table.choice("keyframe.cone_balance", cone_balance,
                {{"above", Balance::kAbove}, {"below", Balance::kBelow}, {"off", Balance::kOff}},
-               "Cone rule: how far these must be spread (ECOG against its threshold)");
-  table.boolean(
-      "keyframe.cone_scaled", cone_scaled,
-      "Cone rule: thresholds follow what a scene has, and balance is waited for six frames at most");
+               "Cone rule: required spread of these points (ECOG against its threshold)");
+  table.boolean("keyframe.cone_scaled", cone_scaled,
+                "Cone rule: scale thresholds with the scene, and wait six frames for balance at most");
   table.choice(
       "keyframe.urgent", urgent,
       {{"thin", Urgent::kThin}, {"nearly_lost", Urgent::kNearlyLost}, {"off", Urgent::kOff}},
-      "When a keyframe is made whatever the rule says: thin: much less is tracked than after the last "
-      "one, or min_features are not reached; nearly_lost: not even half of min_features; off: never");
+      "Condition for a keyframe independent of the rule: thin: much less is tracked than after the last one, "
+      "or fewer than min_features; nearly_lost: fewer than half of min_features; off: none");
 }
 
 bool KeyframeRule::plain_wants(const KeyframeDecision& d) const {

@@ -10,12 +10,13 @@ void LandmarkCullingOptions::declare(core::OptionTable& table) {
   table.number("landmark.min_found", min_found_share, {0.0, 1.0}, "",
                "Remove landmarks found in a smaller share of the frames that should see them");
   table.integer("landmark.min_visible", min_visible, {1, 1000}, "",
-                "Frames that should have seen a landmark before that share is judged");
+                "Number of frames that should have seen a landmark before that share is tested");
   table.boolean("landmark.by_keyframes", by_keyframes, "Count only frames that become keyframes");
   table.integer("landmark.min_keyframes", min_keyframes, {1, 100}, "",
-                "Remove landmarks that fewer keyframes see after the grace time; 1: none");
+                "Remove landmarks that fewer keyframes see after the grace period; 1: none");
   table.integer("landmark.min_age", grace_keyframes, {1, 1000}, "",
-                "Keyframes made after a landmark's own before it is judged by those that see it");
+                "Grace period: number of keyframes after a landmark's first before the keyframes that see it "
+                "are counted");
 }
 
 template <typename Landmark>

@@ -201,9 +201,9 @@ void TriangulationOptions::declare(core::OptionTable& table) {
   table.integer("triangulate.keyframes", keyframes, {1, 50}, "",
                 "Number of neighbouring keyframes to search");
   table.number("triangulate.max_sigma", max_relative_sigma, {0.001, 1.0}, "",
-               "Standard deviation of a triangulated depth over that depth, at most");
+               "Largest standard deviation of a triangulated depth, relative to that depth");
   table.integer("triangulate.line_views", min_line_views, {2, 10}, "",
-                "Keyframes that must agree about a line without depth");
+                "Number of keyframes that must agree on a line without depth");
 }
 
 std::vector<core::PointId> triangulate_points(maps::Map& map, KeyframeId keyframe,

@@ -126,7 +126,7 @@ std::string LoopCloser::judge(const maps::Map& map, LoopTrial& trial) const {
   const double allowed_m = options_.max_drift * trial.path_m;
   if (trial.correction_m > kAlways_m + allowed_m ||
       trial.correction_rad > kAlways_rad + kRadiansPerMetre * allowed_m) {
-    return fmt::format("{:.2f} m and {:.2f} rad are more than drift explains on {:.1f} m", trial.correction_m,
+    return fmt::format("{:.2f} m and {:.2f} rad exceed what drift explains on {:.1f} m", trial.correction_m,
                        trial.correction_rad, trial.path_m);
   }
   return {};

@@ -258,19 +258,19 @@ void VerificationOptions::declare(core::OptionTable& table) {
   table.integer("verify.min_inliers", min_inliers, {4, 10000}, "",
                 "Smallest number of points that agree with a recognised place; lines count twice");
   table.number("verify.min_found", min_found, {0.0, 1.0}, "",
-               "Share of a place's landmarks in view that must be found");
+               "Smallest share of a place's landmarks in view that must be found");
   table.number("verify.min_evidence", min_evidence, {0.0, 1e6}, "",
-               "Agreeing points (lines twice) times the share found, at least");
+               "Smallest product of agreeing points (lines twice) and the share found");
   table.integer("verify.min_cells", min_cells, {1, 16}, "",
-                "Parts of the image, of 16, that must hold matches");
+                "Smallest number of parts of the image, of 16, with matches");
   table.number("verify.min_overlap", min_overlap, {0.0, 1.0}, "",
                "Smallest share of a place's surface in view that is confirmed");
   table.number("verify.max_contradiction", max_contradiction, {0.0, 1.0}, "",
                "Largest share of it in space that was seen to be free");
   table.integer("verify.rounds", rounds, {10, 100000}, "", "Largest number of RANSAC samples");
-  table.boolean("verify.depth_rows", depth_rows, "Points are held by their depth, too");
-  table.boolean("verify.joint", joint, "Landmarks are adjusted together with the pose between two keyframes");
-  table.boolean("verify.align", align, "Surfaces have a say in that pose");
+  table.boolean("verify.depth_rows", depth_rows, "Use the depth of points, too");
+  table.boolean("verify.joint", joint, "Adjust landmarks together with the pose between two keyframes");
+  table.boolean("verify.align", align, "Refine that pose by aligning surfaces");
 }
 
 PlaceVerification verify_place(const PlaceView& query, const PlaceView& match,

@@ -149,11 +149,11 @@ void MapFusionOptions::declare_decision(core::OptionTable& table, const std::str
   table.number(prefix + "drift", consistency.apart_per_metre, {0.0, 1.0}, "",
                "Additional distance per metre between the pairs, for drift");
   table.number(prefix + "max_alternative", alternative, {0.0, 1.0}, "",
-               "A second answer with this share of the best one's keyframes makes both doubtful");
+               "Share of the best answer's keyframes from which a second answer makes both doubtful");
   table.number(prefix + "max_seen_through", max_seen_through, {0.0, 1.0}, "",
-               "Share of the landmarks seen through that rules such an answer out");
+               "Share of landmarks seen through from which such an answer is ruled out");
   table.number(prefix + "min_confirmed", min_confirmed, {0.0, 1.0}, "",
-               "Share of the keyframes with a view of the other map that must see what it holds");
+               "Smallest share of the keyframes with a view of the other map that must confirm it");
   table.integer(prefix + "verifications", verifications, {1, 100000}, "",
                 "Largest number of pairs of keyframes to verify for each two maps");
   table.boolean(prefix + "robust", robust, "Let the pose graph reject wrong pairs of keyframes");

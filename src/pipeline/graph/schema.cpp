@@ -81,7 +81,7 @@ Json taps_schema(const StageRegistry& registry) {
     }
   }
   properties["file"]["description"] =
-      "Below the result folder; a * stands for the number where there are many";
+      "File below the result folder; a * stands for the number if there are many";
   Json tap = {{"type", "object"}, {"additionalProperties", false}, {"properties", std::move(properties)}};
   tap["required"] = Json::array({"port", "file"});
   return {{"type", "array"}, {"items", std::move(tap)}};

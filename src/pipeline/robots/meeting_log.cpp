@@ -93,12 +93,12 @@ core::Result<void> MeetingLog::note(const MeetingEvent& event, const std::vector
       log_->debug(fmt::format("{} and {}: a common place is verified {} ({})", a, b, when, keyframe));
       return {};
     case MeetingStep::kLocalMapAsked:
-      log_->debug(fmt::format("{} and {}: the local maps around it are asked for {}", a, b, when));
+      log_->debug(fmt::format("{} and {}: the local maps around it are requested {}", a, b, when));
       return {};
     case MeetingStep::kMet:
       meetings_.push_back({static_cast<int>(meetings_.size()) + 1, a, b, time_s, event.frame, false});
       log_->info(
-          fmt::format("{} and {} have met {}: {} keyframes agree to {:.0f} mm; {} maps are in one frame now",
+          fmt::format("{} and {} have met {}: {} keyframes agree to {:.0f} mm; {} maps are now in one frame",
                       a, b, when, event.evidence.consistency.agreeing,
                       1e3 * event.evidence.alignment.spread_m, event.preview->parts.size()));
       return write(event, names, when);

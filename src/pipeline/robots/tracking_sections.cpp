@@ -85,7 +85,9 @@ Json feedback_section(const Slams& slams, const mapping::OtherMapsInbox& others)
           {"keyframes_received", maps ? maps->map.keyframe_count() : 0},
           {"relocalised", relocalised},
           {"loops", loops},
-          {"note", "this map depends on what the network brought and when: another run gives other bytes"}};
+          {"note",
+           "this map depends on the data received from the network and their times: another run gives other "
+           "bytes"}};
 }
 
 void doubt_disputed_loops(const Json& summary, std::vector<Doubt>& reasons) {
@@ -96,8 +98,8 @@ void doubt_disputed_loops(const Json& summary, std::vector<Doubt>& reasons) {
   });
   reasons.push_back(
       {Doubt::About::kDisputedLoops,
-       fmt::format("{} loops agree that keyframe {} lies {:.2f} m from where the map has it, beside "
-                   "keyframe {}; that is more than drift explains on {:.1f} m: the path is wrong "
+       fmt::format("{} loops agree that keyframe {} lies {:.2f} m from its pose in the map, relative to "
+                   "keyframe {}; that exceeds what drift explains on {:.1f} m: the path is wrong "
                    "between them, or two places look alike",
                    worst.at("loops").get<int>(), worst.at("query").get<int>(),
                    worst.at("correction_m").get<double>(), worst.at("match").get<int>(),

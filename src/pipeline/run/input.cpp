@@ -59,7 +59,7 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_live_input(const std::s
                                                                     core::Log& log) {
   if (!options.live.open) {
     return core::usage_error(
-        fmt::format("{}: is live, and a recording is needed here; map it and keep what came: plumbline map "
+        fmt::format("{}: is live, but a recording is needed; record it while mapping: plumbline map "
                     "'{}' -o OUT --record take.mcap",
                     address, address));
   }
@@ -78,12 +78,12 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_input(const std::string
   if (dataset::is_live_address(input)) return open_live_input(input, options, log);
   if (!options.live.record.empty() || options.live.for_s < kNoEnd_s) {
     return core::usage_error(
-        fmt::format("{}: is a recording; --record and --for are about live cameras (ros2://DOMAIN)", input));
+        fmt::format("{}: is a recording; --record and --for are for live cameras (ros2://DOMAIN)", input));
   }
   if (!synth::is_synth_url(input)) return dataset::open_recording(input, options, log);
   if (!options.camera.empty()) {
     return core::usage_error(
-        fmt::format("{}: has its own camera, '{}' cannot take its place; write the world to a folder "
+        fmt::format("{}: has its own camera, which '{}' cannot replace; write the world to a folder "
                     "(plumbline synth), and map that with --camera",
                     input, options.camera));
   }

@@ -32,7 +32,7 @@ namespace {
 /// `threads` 0: left out.
 std::string config_text(const MapRequest& request, const Graph& graph, int threads) {
   std::string text = fmt::format(
-      "# What plumbline {} ran with. A pipeline file itself: plumbline map INPUT -p config.yaml\n",
+      "# Configuration of plumbline {}, itself a pipeline file: plumbline map INPUT -p config.yaml\n",
       core::version());
   text += "run:\n";
   text += fmt::format("  input: {}\n  pipeline: {}\n", quoted(request.input), quoted(request.pipeline));
@@ -138,12 +138,12 @@ bool any_stage(const Graph& graph, Question question) {
 /// Checks that the pipeline supports the request.
 core::Result<void> fits(const Graph& graph, const MapRequest& request) {
   if (!request.debug_video.empty() && !any_stage(graph, &Stage::draws_frames)) {
-    return core::usage_error(fmt::format(
-        "{}: has no track stage whose work could be drawn; leave out --debug-video", graph.file.string()));
+    return core::usage_error(
+        fmt::format("{}: has no track stage to draw; leave out --debug-video", graph.file.string()));
   }
   if (request.open.poses == dataset::PoseUse::kGiven && !any_stage(graph, &Stage::takes_given_poses)) {
     return core::usage_error(
-        fmt::format("{}: has no stage 'poses' that takes poses as they are given; leave out --poses given, "
+        fmt::format("{}: has no stage 'poses' for given poses; leave out --poses given, "
                     "or the pipeline",
                     graph.file.string()));
   }
@@ -156,12 +156,12 @@ core::Result<void> fits(const Graph& graph, const MapRequest& request) {
 
 core::Result<void> fits_live(const MapRequest& request) {
   if (request.live != nullptr && request.resume) {
-    return core::usage_error("frames that come one by one: nothing of an earlier run can be resumed");
+    return core::usage_error("with frames fed one by one an earlier run cannot be resumed");
   }
   if (!dataset::is_live_address(request.input)) return {};
   const char* wrong = request.resume ? "--resume" : request.pace_hz > 0.0 ? "--pace" : nullptr;
   if (wrong == nullptr) return {};
-  return core::usage_error(fmt::format("{}: is live; {} is about recordings", request.input, wrong));
+  return core::usage_error(fmt::format("{}: is live; {} is for recordings", request.input, wrong));
 }
 
 core::Result<void> can_resume(const Graph& graph, const MapRequest& request) {
@@ -174,7 +174,7 @@ core::Result<void> can_resume(const Graph& graph, const MapRequest& request) {
   }
   if (!request.debug_video.empty()) {
     return core::usage_error(
-        "--debug-video: there are no pictures of what an earlier run tracked; leave it out with --resume");
+        "--debug-video: an earlier run's frames cannot be drawn; leave it out with --resume");
   }
   return {};
 }

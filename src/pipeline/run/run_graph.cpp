@@ -297,7 +297,7 @@ class Runner {
       for (std::size_t i = 0; i < node.inputs.size(); ++i) {
         const Port& port = node.type->inputs[i];
         if (port.type.rate == Rate::kEnd && port.required && !io.input_values()[i]) {
-          throw std::logic_error("nothing came for its input " + port.name);
+          throw std::logic_error("nothing was received for its input " + port.name);
         }
       }
       return node.stage->finish(io);

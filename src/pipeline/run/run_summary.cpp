@@ -86,11 +86,11 @@ std::string reason_of(const Graph& graph, const Json& summary) {
 std::string live_text(const Json& live) {
   const auto count = [&](const char* name) { return live.at(name).get<std::size_t>(); };
   const std::size_t came = count("taken") + count("dropped") + count("stamps_backwards");
-  std::string text = fmt::format("{} of {} frames that came were taken", count("taken"), came);
-  for (const auto& [name, what] : {std::pair{"dropped", "dropped, as too many waited"},
-                                   {"stamps_backwards", "left out, as their stamps went back"},
-                                   {"unpaired_images", "images without one of the other kind near them"},
-                                   {"lost_messages", "messages lost on the way"}}) {
+  std::string text = fmt::format("{} of {} received frames were mapped", count("taken"), came);
+  for (const auto& [name, what] : {std::pair{"dropped", "dropped, because too many were waiting"},
+                                   {"stamps_backwards", "left out, because their stamps went back"},
+                                   {"unpaired_images", "images without a partner of the other kind"},
+                                   {"lost_messages", "messages lost by the network"}}) {
     if (count(name) > 0) text += fmt::format(", {} {}", count(name), what);
   }
   return text;

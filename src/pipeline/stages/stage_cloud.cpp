@@ -70,7 +70,7 @@ class CloudStage : public Stage {
     table.integer("intermediate_every", intermediate_every_, {0, 100000}, "",
                   "Also make a cloud of every N-th frame between keyframes, and of the last; 0: of none");
     table.integer("free_space_every", free_space_every_, {0, 100000}, "",
-                  "Keep every N-th frame without a cloud as a test of free space; 0: none");
+                  "Use every N-th frame without a cloud to test free space; 0: none");
     filters_.declare(table, "Filter chain for the cloud of each keyframe; empty: none");
   }
   void check(const CheckContext& context, const core::ConfigMark& /*mark*/, const std::string& path,

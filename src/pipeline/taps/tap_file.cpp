@@ -32,7 +32,7 @@ void Tap::check(const CheckContext& /*context*/, const core::ConfigMark& mark, c
     return refuse(fmt::format("{} is not a file below the result folder, such as {}", file_, example));
   }
   if (std::any_of(file_.begin(), file_.end(), [](unsigned char c) { return c < 0x20; })) {
-    return refuse("a file's name has no control characters");
+    return refuse("the file's name contains control characters");
   }
   if (std::find(endings_.begin(), endings_.end(), ending()) == endings_.end()) {
     refuse(fmt::format("{}: a {} is not written here (allowed: {})", file_,

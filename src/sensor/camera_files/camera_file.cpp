@@ -186,10 +186,10 @@ std::string camera_problem(const Camera& camera) {
   const bool finite = is_finite(camera.distortion) && is_finite(camera.depth_lens.k);
   if (!finite) return "a distortion coefficient is not finite";
   if (!(camera.depth_scale >= 1e-3 && camera.depth_scale <= 1e7))
-    return fmt::format("the depth scale {} makes no sense (raw units per metre: 0.001 to 1e7)",
+    return fmt::format("the depth scale {} is out of range (raw units per metre: 0.001 to 1e7)",
                        camera.depth_scale);
   if (!(camera.fps >= 1e-3 && camera.fps <= 1e4))
-    return fmt::format("{} images a second make no sense", camera.fps);
+    return fmt::format("{} images per second are not possible", camera.fps);
   return "";
 }
 

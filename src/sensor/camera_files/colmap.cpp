@@ -97,7 +97,7 @@ core::Result<CameraReading> read_colmap(const CameraText& text) {
       return refuse(wrong);
   }
   reading.has_size = true;
-  reading.notes.emplace_back("half a pixel taken off the principal point");
+  reading.notes.emplace_back("half a pixel subtracted from the principal point");
   return reading;
 }
 

@@ -51,7 +51,7 @@ core::Result<CameraReading> read_kalibr(const CameraText& text) {
   const core::ConfigNode* coefficients = find_any(node, {"distortion_coeffs", "distortion_coefficients"});
   if (coefficients == nullptr) return reading;
   const auto d = numbers_in(*coefficients);
-  if (!d) return refuse(*coefficients, "the distortion coefficients are not made of numbers");
+  if (!d) return refuse(*coefficients, "the distortion coefficients are not numbers");
   const std::string wrong = take_coefficients(word_at(node, {"distortion_model"}), *d, camera);
   if (!wrong.empty()) return refuse(*coefficients, wrong);
   return reading;

@@ -38,7 +38,7 @@ core::Result<CameraReading> read_open3d(const CameraText& text) {
 
   const core::ConfigNode& matrix = *find_any(node, {"intrinsic_matrix"});
   const auto k = numbers_in(matrix);
-  const std::string wrong = k ? take_matrix(*k, camera) : "intrinsic_matrix is not made of numbers";
+  const std::string wrong = k ? take_matrix(*k, camera) : "intrinsic_matrix does not consist of numbers";
   if (!wrong.empty()) return refuse_camera(text, kOpen3dCamera, matrix.mark, wrong, camera);
   return reading;
 }

@@ -54,7 +54,7 @@ std::string take_stream(const core::ConfigNode& node, Lens& lens, Pinhole& pinho
   const core::ConfigNode* coefficients = find_any(node, {"coeffs", "distortion_coeffs", "coefficients"});
   if (coefficients == nullptr) return "";
   const auto d = numbers_in(*coefficients);
-  if (!d) return "the distortion coefficients are not made of numbers";
+  if (!d) return "the distortion coefficients are not numbers";
   return take_coefficients(word_at(node, {"model", "distortion_model"}), *d, lens);
 }
 
@@ -85,7 +85,7 @@ std::string take_depth_stream(const RealSenseStreams& found, CameraReading& read
   if (same_pinhole(depth, reading.camera.color)) return "";
   if (found.extrinsics == nullptr) {
     reading.notes.emplace_back(
-        "depth is taken as aligned to colour: the file has no extrinsics depth_to_color");
+        "depth is assumed to be aligned to colour: the file has no extrinsics depth_to_color");
     return "";
   }
   reading.camera.depth = depth;

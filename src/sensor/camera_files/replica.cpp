@@ -33,7 +33,7 @@ core::Result<CameraReading> read_replica(const CameraText& text) {
   if (coefficients == nullptr) return reading;
   const auto d = numbers_in(*coefficients);
   const std::string wrong =
-      d ? take_coefficients("", *d, camera) : "the distortion coefficients are not made of numbers";
+      d ? take_coefficients("", *d, camera) : "the distortion coefficients are not numbers";
   if (!wrong.empty()) return refuse_camera(text, kReplicaCamera, coefficients->mark, wrong, camera);
   return reading;
 }

@@ -39,7 +39,8 @@ core::Result<CameraReading> read_ros(const CameraText& text) {
   const core::ConfigNode& matrix = *find_any(text.tree, kMatrixNames);
   const auto k = numbers_in(matrix);
   if (!k)
-    return refuse_camera(text, kRosCamera, matrix.mark, "the camera matrix is not made of numbers", camera);
+    return refuse_camera(text, kRosCamera, matrix.mark, "the camera matrix does not consist of numbers",
+                         camera);
   if (k->size() == 9 && (*k)[0] == 0.0) {
     return refuse_camera(text, kRosCamera, matrix.mark, "the matrix is zero: this camera was not calibrated",
                          camera);
@@ -54,7 +55,7 @@ core::Result<CameraReading> read_ros(const CameraText& text) {
   if (coefficients == nullptr) return reading;
   const auto d = numbers_in(*coefficients);
   const std::string wrong = d ? take_coefficients(word_at(text.tree, {"distortion_model"}), *d, camera)
-                              : "the distortion coefficients are not made of numbers";
+                              : "the distortion coefficients are not numbers";
   if (!wrong.empty()) return refuse_camera(text, kRosCamera, coefficients->mark, wrong, camera);
   return reading;
 }

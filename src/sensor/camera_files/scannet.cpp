@@ -56,11 +56,11 @@ std::string take_scannet(const ScanNetKeys& keys, const std::string& which, Came
   const double width = value(sens ? "m_" + which + "Width" : which + "Width");
   const double height = value(sens ? "m_" + which + "Height" : which + "Height");
   if (!(width >= 1.0) || !(height >= 1.0) || width > 1e6 || height > 1e6)
-    return fmt::format("no size of the {} image", which);
+    return fmt::format("the size of the {} image is missing", which);
   camera.color.width = static_cast<int>(width);
   camera.color.height = static_cast<int>(height);
   const bool all = std::isfinite(camera.color.fx + camera.color.fy + camera.color.cx + camera.color.cy);
-  return all ? "" : fmt::format("not all of fx_{0} fy_{0} mx_{0} my_{0} are there", which);
+  return all ? "" : fmt::format("some of fx_{0} fy_{0} mx_{0} my_{0} are missing", which);
 }
 
 core::Result<CameraReading> read_scannet(const CameraText& text) {
@@ -78,7 +78,7 @@ core::Result<CameraReading> read_scannet(const CameraText& text) {
     reading.camera.depth_scale = shift->second[0];
   reading.has_size = true;
   reading.has_depth_scale = true;
-  reading.notes.emplace_back("colour and depth are taken from one place");
+  reading.notes.emplace_back("colour and depth are assumed to have the same pose");
   return reading;
 }
 

@@ -113,7 +113,7 @@ core::Result<void> SynthSource::Impl::check_way() const {
     const core::ConfigMark& mark = robot_path.waypoints[k].mark;
     return core::usage_error(
         fmt::format("{}:{}: the path of {} {} {} (line {}) between waypoints {} and {}, at ({:.2f}, {:.2f}, "
-                    "{:.2f}); move a waypoint or the thing",
+                    "{:.2f}); move a waypoint or the object",
                     mark.file, mark.line, robot_path.name, how, thing.name, thing.mark.line, k, (k + 1) % n,
                     p.x(), p.y(), p.z()));
   };

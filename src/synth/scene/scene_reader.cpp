@@ -24,9 +24,9 @@ bool read_waypoint(const ConfigNode& node, const std::string& path, double heigh
   w.pitch_rad = pitch;
   w.mark = node.mark;
   table.numbers("at", at, 0, {-1000.0, 1000.0}, "m", "Position");
-  table.numbers("look", look, 3, {-1000.0, 1000.0}, "m", "Point looked at");
+  table.numbers("look", look, 3, {-1000.0, 1000.0}, "m", "Point that the camera looks at");
   table.number("pitch", w.pitch_rad, {-1.5, 1.5}, "rad", "Angle by which the camera looks up");
-  table.number("yaw", w.yaw_rad, {-7.0, 7.0}, "rad", "Looks left by");
+  table.number("yaw", w.yaw_rad, {-7.0, 7.0}, "rad", "Angle by which the camera looks left");
 
   if (node.kind == ConfigNode::Kind::kSequence) {
     table.set("at", node, path, problems);

@@ -127,7 +127,7 @@ def messages(case):
                         code=2)
         check("ends in .mcap" in text, text)
         text = case.run("map", case.address(), "-o", case.work / "short", "--for", "2s")
-        check("frames that came were taken" in text, text)
+        check("received frames were mapped" in text, text)
     finally:
         playing.send_signal(signal.SIGINT)
         case.end(playing, "play.log")
