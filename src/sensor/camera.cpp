@@ -252,8 +252,8 @@ std::string to_yaml(const Camera& camera) {
                         camera.depth_slope[0], camera.depth_slope[1]);
   }
   if (camera.depth_delay_s != 0.0) {
-    text +=
-        fmt::format("depth_delay: {}  # s, delay of depth images after their stamps\n", camera.depth_delay_s);
+    text += fmt::format("depth_delay: {}  # s that depth images were taken later than their stamps say\n",
+                        camera.depth_delay_s);
   }
   if (camera.color_from_depth && camera.depth) {
     const Eigen::Matrix4d m = camera.color_from_depth->isometry().matrix();

@@ -14,8 +14,8 @@ namespace {
 
 /// Configuration text that does not depend on the order in which the maps were named.
 std::string config_text(const FuseRequest& request, const maps::StoredMaps& maps, const Graph& graph) {
-  std::string text = fmt::format(
-      "# Configuration of plumbline {}, for: plumbline fuse MAP... -p config.yaml\n", core::version());
+  std::string text =
+      fmt::format("# What plumbline {} fused with: plumbline fuse MAP... -p config.yaml\n", core::version());
   text += "run:\n  maps: [";
   for (std::size_t p = 0; p < maps.parts().size(); ++p) {
     text += fmt::format("{}\"{}\"", p == 0 ? "" : ", ", maps.parts()[p].name);

@@ -32,7 +32,7 @@ namespace {
 /// `threads` 0: left out.
 std::string config_text(const MapRequest& request, const Graph& graph, int threads) {
   std::string text = fmt::format(
-      "# Configuration of plumbline {}, itself a pipeline file: plumbline map INPUT -p config.yaml\n",
+      "# What plumbline {} ran with. A pipeline file itself: plumbline map INPUT -p config.yaml\n",
       core::version());
   text += "run:\n";
   text += fmt::format("  input: {}\n  pipeline: {}\n", quoted(request.input), quoted(request.pipeline));
