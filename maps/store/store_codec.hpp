@@ -53,7 +53,7 @@ void fields(Io& io, Camera& c) {
 
 namespace plumbline::maps {
 
-/// Landmarks and frame poses of neighbouring numbers stream a row.
+/// Landmarks and frame poses of neighbouring numbers share a row.
 constexpr std::int32_t kLandmarksPerPage = IdMap<PointId, MapPoint>::kIdsPerPage;
 static_assert(kLandmarksPerPage == 64, "the store's format");
 constexpr std::size_t kFramesPerPage = 256;

@@ -15,7 +15,7 @@ using features::Line3;
 using features::LineFeature;
 using features::PointFeature;
 
-/// column(get) puts or takes one number of each thing, `get` giving a reference to it.
+/// column(get) writes or reads one number of each thing; `get` returns a reference to it.
 template <typename T, typename Io, typename Things>
 auto column(Io& io, Things& things) {
   return [&io, &things](const auto& get) {

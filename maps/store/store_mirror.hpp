@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Keeps a table equal to the program's data at the cost of what changed.
+// Keeps a table equal to the program's data, at a cost that depends on the changes only.
 #include <functional>
 #include <map>
 #include <string>

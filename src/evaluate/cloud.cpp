@@ -160,7 +160,7 @@ struct Distances {
   std::size_t cosine_count = 0;
 };
 
-/// From every point of `from`, visited in `order`, to `surface`.
+/// Distances from every point of `from`, visited in `order`, to `surface`.
 Distances measure(const Points& from, const Points& normals, const std::vector<std::uint32_t>& order,
                   const MeasuredSurface& surface, const core::Executor& executor) {
   Distances out;

@@ -87,8 +87,8 @@ struct NormalEquations {
 class SchurComplement {
  public:
   explicit SchurComplement(int free_poses);
-  /// The step of all unknowns at this radius of the trust region (of landmarks: in their families); false
-  /// when the equations cannot be solved.
+  /// The step of all unknowns at this radius of the trust region (landmarks: in their families); false if the
+  /// equations cannot be solved.
   bool solve(NormalEquations& equations, double radius);
   [[nodiscard]] Eigen::Matrix<double, 6, 1> pose_step(std::size_t slot) const {
     return pose_steps_.segment<6>(static_cast<Eigen::Index>(6 * slot));
@@ -109,7 +109,7 @@ class SchurComplement {
   std::vector<Target> targets_;
 };
 
-/// One round: linearises, steps, keeps what lowers the cost.
+/// One round: linearises, steps, and keeps steps that lower the cost.
 class BundleRound {
  public:
   BundleRound(const BundleProblem& problem, const BundleOptions& options);

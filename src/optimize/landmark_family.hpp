@@ -53,7 +53,7 @@ struct LandmarkFamily {
   std::vector<Square> inverse;  ///< of the damped Hessian
   std::vector<Vector> step;     ///< of the landmark alone, minus; then the step itself
 
-  /// `observations` are there; the rest is made room for.
+  /// `observations` must be set; allocates the rest.
   void prepare(std::size_t slots, std::size_t landmarks) {
     slot_begin.assign(slots + 1, 0);
     landmark_begin.assign(landmarks + 1, 0);

@@ -29,8 +29,8 @@ std::uint64_t voxel_of(const WorldSurface& s, double voxel_m) {
          static_cast<std::uint64_t>(cloud::facing(s.normal));
 }
 
-/// Weighted means of position and normal per voxel; sigma falls with the weight, down to what noise common to
-/// neighbouring pixels leaves. In order of first appearance.
+/// Weighted means of position and normal per voxel; sigma falls with the weight, down to the noise that
+/// neighbouring pixels share. In order of first appearance.
 std::vector<WorldSurface> fuse_voxels(const std::vector<WorldSurface>& samples, double voxel_m) {
   cloud::CellMap<std::size_t> index;
   index.reserve(samples.size());

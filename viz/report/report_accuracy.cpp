@@ -125,7 +125,7 @@ void add_saved_path(const std::string& file, const Json& json, JsonTable& table)
   table.row(json, {name.empty() ? file : file + ": " + name});
 }
 
-/// evaluation*.json of the folder: what plumbline evaluate --json printed.
+/// Section of evaluation*.json files in the folder, printed by plumbline evaluate --json.
 std::string saved_html(const ReportData& data) {
   std::vector<std::string> names;
   std::error_code ec;

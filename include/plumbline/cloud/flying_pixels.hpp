@@ -2,7 +2,7 @@
 #pragma once
 
 // Points at depth jumps: at the border of an object a pixel sees foreground and background at once, and its
-// depth hangs in the air between them. (pcl::ShadowPoints is a test of incidence and loses the organisation.)
+// depth lies between them in the air. (pcl::ShadowPoints tests the incidence and loses the organisation.)
 #include <pcl/exceptions.h>
 
 #include <Eigen/Core>

@@ -10,8 +10,8 @@
 
 namespace plumbline::cloud {
 
-/// Keeps points whose normal is within an angle of the ray to the viewpoint, whichever side of the surface is
-/// seen. `PointT` has unit normals; the cloud may be organised or not.
+/// Keeps points whose normal is within an angle of the ray to the viewpoint, for either side of the surface.
+/// `PointT` has unit normals; the cloud may be organised or not.
 template <typename PointT>
 class IncidenceAngle : public ChoosingFilter<PointT> {
  public:

@@ -33,7 +33,8 @@ class NormalConsistency : public ChoosingFilter<PointT> {
   void setMaxAngle(double max_angle_rad) { max_angle_rad_ = max_angle_rad; }
   /// Share of the neighbours that must agree, 0 to 1; more than 1/2 removes edges.
   void setMinShare(double min_share) { min_share_ = min_share; }
-  /// Its threads are used; null (the default): one. The result does not depend on it.
+  /// Sets the executor whose threads are used; null (the default): one thread. The result does not depend on
+  /// it.
   void setExecutor(const core::Executor* executor) { executor_ = executor; }
 
  protected:

@@ -16,7 +16,7 @@ namespace plumbline::cloud {
 using SurfacePoint = pcl::PointNormal;
 using SurfaceCloud = pcl::PointCloud<SurfacePoint>;
 
-/// `sigma_m`: how exactly it is known along its normal.
+/// `sigma_m`: standard deviation along its normal.
 inline SurfacePoint surface_point(const Eigen::Vector3f& position, const Eigen::Vector3f& normal,
                                   float sigma_m) {
   SurfacePoint p;

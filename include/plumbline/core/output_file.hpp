@@ -46,7 +46,7 @@ class OutputFile {
   std::string problem_;
 };
 
-/// With all folders above it; one that is there is as good. Errors (kOutput).
+/// Makes the folder and all folders above it; existing ones are fine. Errors (kOutput).
 Result<void> make_folder(const std::filesystem::path& folder);
 
 /// A whole file at once.

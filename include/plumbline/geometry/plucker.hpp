@@ -34,7 +34,7 @@ struct OrthonormalLine {
   double w2 = 1.0;  ///< W21 = |v| / sqrt(|n|^2 + |v|^2)
 };
 
-/// A line through the origin has n = 0: any n perpendicular to v serves.
+/// For a line through the origin, with n = 0, any n perpendicular to v is used.
 OrthonormalLine to_orthonormal(const PluckerLine& line);
 /// Up to scale; v is made unit length.
 PluckerLine to_plucker(const OrthonormalLine& line);

@@ -38,7 +38,7 @@ Eigen::Matrix3d exp_so3(const Eigen::Vector3d& phi);
 Eigen::Vector3d log_so3(const Eigen::Matrix3d& rotation);  ///< angle in [0, pi]
 double rotation_angle(const Eigen::Matrix3d& rotation);    ///< radians, [0, pi]
 
-/// Linear in translation, slerp in rotation; s = 0 gives a, s = 1 gives b.
+/// Interpolates linearly in translation, by slerp in rotation; s = 0 gives a, s = 1 gives b.
 Rigid3 interpolate(const Rigid3& a, const Rigid3& b, double s);
 
 }  // namespace plumbline::geometry

@@ -28,10 +28,11 @@ struct FusionSummary {
 };
 
 /// Landmarks of `keyframe` are projected into each of `neighbours`, and the neighbours' landmarks into
-/// `keyframe`. Where one meets a feature that looks like it and lies where it lies, in the image and in
-/// depth: a feature that sees nothing yet becomes an observation; one that sees another landmark shows that
-/// both are one, and the less seen is merged into the other. Two landmarks that one keyframe sees at
-/// different places never merge. Every robot of the keyframes must have a camera (throws std::out_of_range).
+/// `keyframe`. If a feature near the projection looks like the landmark and agrees in image position and
+/// depth, there are two cases: a feature without a landmark becomes an observation; a feature of another
+/// landmark shows that both are one, and the less seen is merged into the other. Two landmarks that one
+/// keyframe sees at different positions never merge. Every robot of the keyframes must have a camera (throws
+/// std::out_of_range).
 FusionSummary fuse_points(maps::Map& map, core::KeyframeId keyframe,
                           const std::vector<core::KeyframeId>& neighbours,
                           const std::map<std::int32_t, sensor::Pinhole>& cameras,

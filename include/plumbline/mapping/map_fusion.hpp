@@ -89,7 +89,7 @@ struct OverlayFit {
   }
 };
 
-/// The largest set of verified pairs of keyframes that say the same of how two worlds lie.
+/// The largest set of verified pairs of keyframes that agree on the relative pose of two worlds.
 struct Consistency {
   int verified = 0;                 ///< pairs in all
   int agreeing = 0;                 ///< keyframes of the set, on the side that has fewer

@@ -51,7 +51,7 @@ class MergeServer {
   /// outlive this.
   MergeServer(const MapFusionOptions& options, int lag, const core::Executor& executor);
 
-  /// A robot joins; robots are numbered 0, 1, ..., in the ids of their maps too.
+  /// Adds a robot; robots are numbered 0, 1, ..., in the ids of their maps too.
   std::size_t join(const Cameras& cameras);
 
   /// A keyframe that is new in `map`, its robot's, at a frame of the log; frames never decrease. Throws

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A finished map once more as a whole: local maps aligned by ICP, then everything adjusted together
-// (docs/method/refinement.md).
+// Refinement of a finished map as a whole: local maps are aligned by ICP, then everything is adjusted
+// together (docs/method/refinement.md).
 #include <map>
 #include <vector>
 

@@ -21,7 +21,7 @@ namespace plumbline::maps {
 /// Edges, loops and observations that lead out of it are left out.
 [[nodiscard]] Map component(const Map& map, core::KeyframeId root);
 
-/// The keyframes, points and lines of the component with this root move by new_from_old of their world.
+/// Moves the keyframes, points and lines of the component with this root by new_from_old of their world.
 void move_component(Map& map, core::KeyframeId root, const geometry::Rigid3& new_from_old_world);
 
 /// Cuts the component of `first` in two: `first` becomes the root of everything its robot made from then on.

@@ -37,7 +37,7 @@ struct FramePose {
   core::KeyframeId reference;
   geometry::Rigid3 camera_from_reference;
   bool tracked = false;
-  /// Motion since the frame before as the tracker saw it; none where one of the two was not tracked.
+  /// Motion since the previous frame as measured by the tracker; none if one of the two was not tracked.
   std::optional<geometry::Rigid3> camera_from_previous;
   double step_sigma_m = 0.0;  ///< its standard deviation where it is known worst; half as much in radians
   /// Observations for estimating its camera; null: not kept.

@@ -17,8 +17,8 @@ struct ResultFolder {
   std::filesystem::path folder;
   [[nodiscard]] std::filesystem::path ply() const { return folder / "map.ply"; }
   [[nodiscard]] std::filesystem::path pcd() const { return folder / "map.pcd"; }
-  /// Folders of trajectory.txt and keyframes.txt: with several robots one each, by name, else the folder
-  /// itself.
+  /// Folders of trajectory.txt and keyframes.txt: one per robot, by name, or the folder itself for a single
+  /// robot.
   [[nodiscard]] std::vector<std::filesystem::path> robot_folders() const;
   [[nodiscard]] std::filesystem::path trajectory() const { return folder / "trajectory.txt"; }
   [[nodiscard]] std::filesystem::path keyframes() const { return folder / "keyframes.txt"; }

@@ -143,7 +143,8 @@ class StoreWriter {
   core::Result<void> add(const StoreStep& step);
   /// A cloud that comes without a keyframe, or replaces one. One transaction.
   core::Result<void> add_cloud(const StoreCloud& cloud);
-  /// Bytes of others under a name, such as a vocabulary; replaces what had the name. One transaction.
+  /// Stores further data, such as a vocabulary, under a name; replaces earlier data of that name. One
+  /// transaction.
   core::Result<void> attach(const std::string& name, const std::vector<std::uint8_t>& bytes);
   /// The finished map, in one transaction: poses, landmarks and edges after all optimisation, all frames. It
   /// is the only one then, of the robots that `robots` lists (empty: those of the header). Marks the store as

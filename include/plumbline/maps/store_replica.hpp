@@ -82,7 +82,7 @@ class StoreReplica {
   /// Appends its bytes, in parts of any size. An error ends the transaction: (kInput) a store does not send
   /// such bytes, (kOutput) they cannot be written.
   core::Result<void> append(const std::uint8_t* bytes, std::size_t size);
-  /// Commits after the last byte; from now on the rows survive a power cut. Errors as append().
+  /// Commits after the last byte; from then on the rows survive a power cut. Errors as append().
   core::Result<void> commit();
   /// Drops the transaction that was begun.
   void roll_back();
@@ -115,8 +115,8 @@ class MapFollower {
   std::unique_ptr<Impl> impl_;
 };
 
-/// A few texts by name in a file of their own, which survive the process and a power cut: identities on the
-/// network. The file is open only during a call, so that its folder may be renamed between calls.
+/// A few named texts in their own file, which survive the process and a power cut: identities on the network.
+/// The file is open only during a call, so that its folder may be renamed between calls.
 class Ledger {
  public:
   explicit Ledger(std::filesystem::path file) : file_(std::move(file)) {}

@@ -29,9 +29,9 @@ struct PageServerLimits {
   static constexpr std::size_t kWaitingEvents = 256;
 };
 
-/// Serves GET / (the page) and GET /events. Refused: other paths and methods (404), a Host or an Origin that
-/// is not the server's own (403), a wrong token (401), a stream too many (503). A request has a second to
-/// come. Thread-safe; send() never waits for a client.
+/// Serves GET / (the page) and GET /events. Refused are other paths and methods (404), a Host or an Origin
+/// that is not the server's own (403), a wrong token (401), and excess streams (503). A request must be
+/// complete within a second. Thread-safe; send() never waits for a client.
 class PageServer {
  public:
   /// Errors (kUsage): the address cannot be listened at; (kInternal): the part is missing.

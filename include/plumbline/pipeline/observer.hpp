@@ -22,8 +22,8 @@ class RunObserver {
   /// For several robots: the pose of one robot's map in the frame that it shares with others.
   virtual void placed(std::int32_t /*robot*/, double /*stamp*/, const geometry::Rigid3& /*shared_from_map*/) {
   }
-  /// A frame that was tracked, in the order of frames. `odometry_from_camera` is the same way without the
-  /// corrections of loops and adjustments: it never jumps.
+  /// A tracked frame, in the order of frames. `odometry_from_camera` is the pose on the same path without
+  /// corrections by loops and adjustments: it never jumps.
   virtual void tracked(std::int32_t /*robot*/, double /*stamp*/, const geometry::Rigid3& /*map_from_camera*/,
                        const geometry::Rigid3& /*odometry_from_camera*/) {}
   /// Every frame, in the order of frames.

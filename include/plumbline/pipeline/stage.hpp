@@ -211,8 +211,8 @@ class Stage {
   /// stage's; a problem of path `path`.key is reported at the position of the key's value.
   virtual void check(const CheckContext& /*context*/, const core::ConfigMark& /*mark*/,
                      const std::string& /*path*/, core::ConfigProblems& /*problems*/) {}
-  /// Asked after check: the files that will be written, relative to the result folder ('*' = a number); no
-  /// two stages may write the same.
+  /// Files that will be written, relative to the result folder ('*' = a number); no two stages may write the
+  /// same one. Called after check.
   [[nodiscard]] virtual std::vector<std::string> files() const { return {}; }
   /// True if the stage writes the map with its clouds to map.db as they come, for which it needs
   /// TrackedFrame::changes. Called after check.

@@ -16,8 +16,8 @@ class Rectifier {
   /// Rectifies into images of the pinhole camera `target`, of the same size, instead of `camera.color`.
   Rectifier(const Camera& camera, const Pinhole& target);
   ~Rectifier();
-  /// 8-bit image, 1 or 3 channels, of the camera's size -> undistorted (bilinear); the same image when
-  /// there is nothing to undo. What no source pixel covers repeats the rim (depth is 0 there). Throws
+  /// Undistorts an 8-bit image, 1 or 3 channels, of the camera's size (bilinear); returns the same image if
+  /// there is nothing to undo. Areas that no source pixel covers repeat the rim (depth is 0 there). Throws
   /// std::invalid_argument on an image of another kind or size; so does depth().
   [[nodiscard]] cv::Mat color(const cv::Mat& raw) const;
   /// Raw 16-bit depth -> CV_32FC1 metres in the undistorted colour camera. 0 and 65535 become 0. Registers

@@ -62,11 +62,11 @@ struct SurfaceAssociationOptions {
   double max_depth_m = 6.0;
 };
 
-/// Projective association of surface samples with `depth` (CV_32FC1, metres): the sample is projected, the
-/// depth measured there is the point that should lie on its tangent plane. `depth_from_camera` carries the
-/// camera of the colour image to that of the depth image (they are stamped apart); the measured points
-/// come back in the colour camera's frame. `in_view` receives how many samples face the camera and have a
-/// measured depth where they should be seen, whether it fits or not.
+/// Projective association of surface samples with `depth` (CV_32FC1, metres): the sample is projected, and
+/// the depth measured there is the point that should lie on its tangent plane. `depth_from_camera` transforms
+/// from the camera of the colour image to that of the depth image (they have different stamps); the measured
+/// points are returned in the colour camera's frame. `in_view` receives the number of samples that face the
+/// camera and have a measured depth where they should be seen, whether it fits or not.
 std::vector<optimize::PlaneTerm> associate_surface(const std::vector<WorldSurface>& surface,
                                                    const cv::Mat& depth, const sensor::Pinhole& camera,
                                                    const geometry::Rigid3& camera_from_world,

@@ -80,8 +80,8 @@ struct TrackResult {
   }
   int degenerate_directions = 0;  ///< of six, that no trusted family constrains, but the motion model at best
   bool dead_reckoned = false;     ///< the motion model holds the degenerate directions, for 2.5 s at most
-  /// Projects a motion (left perturbation of camera_from_world) onto the degenerate directions, or, when it
-  /// is not dead reckoned, onto those known no better than a step is long.
+  /// Projects a motion (left perturbation of camera_from_world) onto the degenerate directions, or, if it is
+  /// not dead reckoned, onto those that are less accurate than the length of a step.
   geometry::Matrix6d onto_degenerate = geometry::Matrix6d::Zero();
   bool motion_contradicted = false;  ///< surfaces, nearly alone, contradict the motion model
   bool relocalised = false;

@@ -54,8 +54,8 @@ struct SnapshotOptions {
 /// Mean of the cameras' up directions (-y of theirs), unit; -y when nothing is known.
 Eigen::Vector3d mean_camera_up(const std::vector<geometry::Trajectory>& paths);
 
-/// Up direction of a scene: the floor's (cloud::find_floor, about the cameras' mean up), or that mean when no
-/// floor is seen. Unit length.
+/// Up direction of a scene: that of the floor (cloud::find_floor, about the cameras' mean up), or the mean
+/// itself if no floor is seen. Unit length.
 Eigen::Vector3d estimate_up(const Scene& scene);
 
 /// Draws the scene and writes a PNG; same scene and options give the same bytes on the same machine. An

@@ -132,7 +132,8 @@ struct CompleteRequest {
   std::vector<std::string> words;  ///< behind the program's name
 };
 
-/// Without the program's name and whatever stands before it (`time`, assignments).
+/// Drops the program's name and everything before it (`time`, assignments), unless the shell has removed them
+/// already.
 std::vector<std::string> words_of(const CompleteRequest& request) {
   if (request.line.empty()) return request.words;
   const std::vector<std::string> words = shell_words(request.line);

@@ -19,7 +19,7 @@ constexpr double kMillimetres = 1000.0;  // units per metre of ROS' 16-bit depth
 constexpr double kNothing = 1e-9;        // rounding error of a transform through quaternions
 const char* const kRealSenseImage = "/image/data";
 
-/// frame names with and without the slash that ROS 1 had in front.
+/// Frame name without the leading slash of ROS 1.
 std::string frame_name(const std::string& frame) {
   return !frame.empty() && frame.front() == '/' ? frame.substr(1) : frame;
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A ROS bag as a list of messages, whatever file it is in. What is in the messages is read by
-// MessageDecoders (messages.hpp).
+// A ROS bag as a list of messages, independent of its file format. MessageDecoders (messages.hpp) read the
+// content of messages.
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>

@@ -12,7 +12,7 @@ namespace plumbline::dataset {
 core::Result<Layout> read_bag(const std::filesystem::path& path, const TopicNames& topics,
                               const LayoutOptions& options, core::Log& log);
 
-/// The rate of colour, to the hundredth, for a camera made of messages; 30 where there are too few.
+/// The rate of colour, to the hundredth, for a camera from messages; 30 if there are too few.
 double usual_fps(const std::vector<PairInfo>& pairs);
 
 }  // namespace plumbline::dataset

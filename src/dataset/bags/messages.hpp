@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The messages of ROS that recordings are made of, as plain structs, and what reads and writes their bytes.
+// The ROS messages of recordings as plain structs, with the interfaces that read and write their bytes.
 #include <array>
 #include <cstdint>
 #include <string>
@@ -84,7 +84,7 @@ struct MessageDecoder {
   DecodedMessage<float> (*number)(const Bytes& bytes);                ///< std_msgs/Float32
 };
 
-/// Messages as CDR, little endian, with the four bytes in front that say so.
+/// Encodes messages as CDR, little endian, with the four bytes of encapsulation in front.
 struct MessageEncoder {
   Bytes (*image)(const ImageMessage& message);
   Bytes (*compressed_image)(const CompressedImageMessage& message);

@@ -104,7 +104,7 @@ class McapTarget final : public CopyTarget {
     bag_->write("/tf_static", {{kColorFrame, kDepthFrame, *camera_.color_from_depth}}, stamp_ns);
   }
 
-  /// JPEG as it is, all else as pixels; the image's size.
+  /// Writes JPEG unchanged, everything else as pixels; returns the image's size.
   core::Result<cv::Size> write_color(const MessageHeader& header, const StoredImage& image) {
     auto pixels = pixels_of(image);
     if (!pixels) return tl::unexpected(pixels.error());

@@ -12,7 +12,7 @@
 namespace plumbline::exports {
 namespace {
 
-/// Ends with the line of the frame that text files carry.
+/// Head of a text file, which ends with the line about the frame.
 std::string path_head(const MapSource& source, const std::string& what) {
   const bool body = !source.options().body.empty();
   return fmt::format("# {}\n# {} in the world; {}\n", what,

@@ -23,7 +23,7 @@ constexpr double kWallUpright = 0.26;  ///< most of a normal that is vertical: 1
 constexpr float kWallAlike = 0.906F;   ///< cosine of 25 degrees
 constexpr double kShortestWall_m = 0.25;
 
-/// A piece of a wall, and how many points show it.
+/// A piece of a wall, and the number of points that show it.
 struct Side {
   WallLine line;
   std::size_t points = 0;
@@ -41,7 +41,7 @@ evaluate::SurfaceSamples upright_samples(const cloud::CloudFile& file, double fl
   return samples;
 }
 
-/// Distance of neighbouring points, from how many share a cell.
+/// Distance of neighbouring points, from the number of points per cell.
 double typical_spacing(const evaluate::SurfaceSamples& samples) {
   constexpr float kCell_m = 0.1F;
   std::map<std::array<int, 3>, int> cells;
@@ -69,7 +69,7 @@ double wall_height(const evaluate::SurfaceSamples& samples, double floor_m) {
   return std::min(kMost_m, static_cast<double>(*high) - floor_m - kBelowTop_m);
 }
 
-/// The line that most points lie on: the commonest distance, then least squares near it.
+/// The line on which most points lie: the most frequent distance, then least squares near it.
 void fit_line(const std::vector<Eigen::Vector2d>& places, WallLine& line) {
   constexpr double kBin_m = 0.001;
   constexpr double kNear_m = 0.008;

@@ -11,7 +11,8 @@ namespace {
 using core::KeyframeId;
 using core::LineId;
 
-// Strict: parallel edges a finger apart are two, and one wrong merger costs more than ten right ones give.
+// Strict, because parallel edges a finger apart are two, and one wrong merge does more harm than ten right
+// ones do good.
 constexpr double kEnd_px = 1.0;       // of a measured end from the landmark's image
 constexpr double kEndSigmas = 3.0;    // of a measured end from the landmark in space
 constexpr double kMaxAngle = 0.07;    // rad, between two landmarks that are one

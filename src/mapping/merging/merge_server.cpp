@@ -73,7 +73,7 @@ void MergeServer::add(std::shared_ptr<const maps::Map> map, KeyframeId id, std::
   if (!id.valid() || static_cast<std::size_t>(id.robot) >= places_.size() || !map->has_keyframe(id)) {
     throw std::invalid_argument("a keyframe that no robot has");
   }
-  // A robot that lost itself: its first component alone, until others were joined to it.
+  // A robot that got lost takes part with its first component only, until others are joined to it.
   const std::vector<KeyframeId> roots = maps::roots(*map);
   if (roots.size() > 1) {
     if (maps::root_of(*map, id) != roots.front()) return;

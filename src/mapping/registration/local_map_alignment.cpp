@@ -32,7 +32,7 @@ Rigid3 rigid_of(const Eigen::Matrix4d& matrix) {
           matrix.topRightCorner<3, 1>()};
 }
 
-/// Up to `wanted` of these points, as many as possible from each of the ways a surface may face, spread over
+/// Up to `wanted` of these points, as evenly as possible from all directions that surfaces face, spread over
 /// the rest.
 pcl::Indices spread(const SurfaceCloud& cloud, const pcl::Indices& some, int wanted) {
   std::array<pcl::Indices, 6> ways;

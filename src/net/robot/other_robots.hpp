@@ -21,7 +21,7 @@ class OtherRobots {
   OtherRobots(std::string name, std::shared_ptr<mapping::OtherMapsInbox> inbox)
       : name_(std::move(name)), inbox_(std::move(inbox)) {}
 
-  /// Learns from any status of the hub where its addressee is in the shared frame.
+  /// Reads from any status of the hub the pose of its addressee in the shared frame.
   void apply(const HubStatus& hub);
   void receive(const Chunk& chunk);
   /// Puts the maps into the inbox when they have changed, every few seconds at most, and so seldom that it

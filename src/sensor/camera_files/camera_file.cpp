@@ -36,8 +36,8 @@ void replace_all(std::string& text, const std::string& from, const std::string& 
     text.replace(at, from.size(), to);
 }
 
-/// OpenCV's YAML and ROS' messages as YAML that parsers take: without their directive and tags, the first
-/// document alone. Lines and columns stay where they are.
+/// OpenCV's YAML and ROS' messages as standard YAML: without their directive and tags, the first document
+/// only. Lines and columns are not moved.
 std::string plain_yaml(std::string text) {
   if (const std::size_t at = text.find("%YAML"); at != std::string::npos && at <= 3) {
     text.replace(at, std::min(text.find('\n', at), text.size()) - at, "");

@@ -48,7 +48,7 @@ bool recognises_colmap(const CameraText& text) {
   return !lines.empty() && colmap_model(lines.front()) != nullptr;
 }
 
-/// Width, height and parameters; none where a word is no number.
+/// Width, height and parameters; none if a word is not a number.
 std::optional<std::vector<double>> colmap_numbers(const CameraLine& line) {
   std::vector<double> numbers;
   for (std::size_t i = 2; i < line.words.size(); ++i) {

@@ -15,7 +15,7 @@
 namespace plumbline::synth {
 
 /// Marks blocks (about 2 cm) of every face that were seen whole from some camera pose, within the sensor's
-/// range, not at a grazing angle, and where the sensor reliably measures: not on what gives it no light back.
+/// range, not at a grazing angle, and where the sensor measures reliably.
 class Visibility {
  public:
   Visibility(std::shared_ptr<const World> world, double spacing);

@@ -6,7 +6,7 @@
 
 namespace plumbline::dataset {
 
-/// The first bytes of a message, of those of its frame; empty when it is damaged.
+/// The first bytes of a message, from those of its zstd frame; empty if it is damaged.
 inline Bytes unpacked_head(const Bytes& packed) {
   Bytes head(kHeadBytes);
   head.resize(make_inflater(Compression::kZstd, packed.data(), packed.size())->get(head.data(), head.size()));

@@ -157,7 +157,7 @@ core::Result<void> Ros1Bag::scan(const Visit& visit) {
                                                            : "unknown compression " + chunk.unknown));
       }
     } else {
-      // In a bag that was not closed the last chunk's records lie open.
+      // In a bag that was not closed the records of the last chunk are not enclosed in it.
       const auto in_file = [&, next = data](std::uint8_t* to, std::size_t count) mutable {
         if (!file_.read(next, to, count)) return false;
         next += count;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::int64_t kNanosecondsOfSecond = 1'000'000'000;
 
-/// Fields one after another; after the first that is not all there every one is 0 or empty.
+/// Reads fields one after another; after the first incomplete one all are 0 or empty.
 class Ros1Fields {
  public:
   Ros1Fields(const std::uint8_t* data, std::size_t size) : data_(data), left_(size) {}
