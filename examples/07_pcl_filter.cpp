@@ -88,7 +88,7 @@ int main() {
   left = filtered(incidence, left, "IncidenceAngle");
   left = filtered(consistency, left, "NormalConsistency");
 
-  // The indices of what one of them takes away.
+  // Indices of the points that one of the filters removes.
   flying.setInputCloud(points);
   flying.setNegative(true);
   pcl::Indices hanging;

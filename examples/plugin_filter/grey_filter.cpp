@@ -14,7 +14,7 @@ using namespace plumbline;
 
 class GreyFilter : public cloud::Filter {
  public:
-  /// Key, where the value goes, allowed range, unit, help: parser, checks and reference follow from it.
+  /// Key, variable, allowed range, unit, help: parser, checks and reference are made from these.
   void declare(core::OptionTable& table) override {
     table.number("share", share_, {0.0, 1.0}, "ratio", "Share of the colour to remove");
   }

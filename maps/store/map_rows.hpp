@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The rows that maps consist of, decoded one by one: all of a file at once, or as they come.
+// The rows of maps, decoded one by one: all of a file at once, or as they arrive.
 #include <map>
 #include <memory>
 #include <string>

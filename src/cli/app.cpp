@@ -50,7 +50,7 @@ const core::Executor& Session::executor() {
 
 int Session::fail(const core::Error& error) {
   const auto problems = std::count(error.message.begin(), error.message.end(), '\n') + 1;
-  // Several problems stand on lines of their own, so that an editor can follow file:line:column.
+  // Several problems are printed on separate lines, so that an editor can follow file:line:column.
   console().error(problems > 1 ? fmt::format("{} problems\n{}", problems, error.message) : error.message);
   return static_cast<int>(error.kind);
 }

@@ -39,7 +39,7 @@ struct Session {
   Console& console();
   /// Made on first use.
   const core::Executor& executor();
-  /// Prints the error and gives its exit code.
+  /// Prints the error and returns its exit code.
   int fail(const core::Error& error);
   /// Ends the progress of a run, prints its result, which wrote `output`, and returns its exit code.
   int finish(const core::Result<pipeline::RunSummary>& summary, const std::filesystem::path& output);

@@ -33,8 +33,8 @@ class Console : public core::Log {
   [[nodiscard]] std::function<void(std::size_t, std::size_t)> counting(const char* what) {
     return [this, what](std::size_t done, std::size_t total) { progress(done, total, what); };
   }
-  /// One line that is kept up on a terminal, a line every few seconds elsewhere; nothing when quiet. While
-  /// there is a bar, it stands behind that.
+  /// One line that is updated on a terminal, a line every few seconds elsewhere; nothing when quiet. If there
+  /// is a bar, it follows that.
   void status(const std::string& line);
   /// Shows the work that remains once all is counted, such as "refine": like status() on a terminal; JSON and
   /// logs get it at once.

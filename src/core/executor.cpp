@@ -67,8 +67,9 @@ void Executor::parallel_for(std::size_t count, const std::function<void(std::siz
     for (std::size_t i = 0; i < count; ++i) body(i);
     return;
   }
-  // Isolated: a thread that waits here takes up nothing else, so that a short loop in a serial stage is not
-  // held up by another frame's long work, and a lock held by the caller cannot meet itself.
+  // Isolated: a thread that waits here runs no other jobs, so that a short loop in a serial stage is not
+  // delayed by another frame's long work, and a lock held by the caller cannot be requested again by the same
+  // thread.
   impl_->arena.execute(
       [&] { tbb::this_task_arena::isolate([&] { tbb::parallel_for(std::size_t{0}, count, body); }); });
 }

@@ -24,7 +24,7 @@ constexpr std::size_t kMaxNodes = 100'000;
 constexpr int kMaxColumns = 100'000;
 constexpr int kMaxOpenBrackets = 1000;
 
-/// Ends the walk: what follows cannot be read sensibly.
+/// Ends the walk, because the rest cannot be read.
 struct Refused {
   ConfigProblem problem;
 };
@@ -208,8 +208,8 @@ class TreeBuilder : public YAML::EventHandler {
   ConfigNode root_;
 };
 
-/// Refuses texts that would cost excessive time or memory, and control characters: yaml-cpp takes 0x04 for
-/// the end of the file, so they would hide what follows them.
+/// Refuses texts that would cost excessive time or memory, and control characters: yaml-cpp treats 0x04 as
+/// the end of the file, so that it would hide the rest.
 void check_characters(const std::string& text, const std::string& file) {
   int line = 1;
   int column = 1;

@@ -15,7 +15,7 @@ constexpr std::size_t kDepthSamples = 5;
 constexpr double kSensorReach_m = 10.0;
 constexpr double kMaxShareBeyondReach = 0.1;
 
-/// Depth of a few frames; of the first readable frame with depth when none of those can be used. Never
+/// Depth of a few frames, or of the first readable frame with depth if none of those can be used. Never
 /// without a measurement.
 core::Result<DepthStatistics> sample_depth(const FrameSource& source, const std::string& folder) {
   DepthStatistics statistics;

@@ -101,7 +101,7 @@ class FolderSource final : public FrameSource {
     return stored_file(name);
   }
 
-  /// A copy has no masks: what they take out is taken out.
+  /// A copy has no masks, so masked depth is removed from the images.
   [[nodiscard]] core::Result<StoredImage> masked_depth(const PairInfo& pair) const {
     auto depth = read_depth(layout_, pair.depth_file, camera_.depth ? *camera_.depth : camera_.color,
                             camera_.depth_scale);

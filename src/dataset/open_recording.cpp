@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Looks one level down: a scene's folder is easily given in place of one of its sequences.
+/// Searches one level down, because a scene's folder is easily given instead of one of its sequences.
 std::string recordings_inside(const fs::path& folder) {
   std::vector<std::string> found;
   std::error_code ignored;
@@ -70,7 +70,8 @@ core::Result<Layout> read_any(const fs::path& path, const OpenOptions& open, con
   return read_layout(path, open.format, options, log);
 }
 
-/// Stamps are whole nanoseconds, as those of messages are, so that no copy of a recording has others.
+/// Rounds stamps to whole nanoseconds, like those of messages, so that copies of a recording have the same
+/// ones.
 void round_stamps(std::vector<PairInfo>& pairs) {
   constexpr double kMost_s = 9e9;  // beyond, nanoseconds do not fit 64 bits
   for (PairInfo& pair : pairs) {

@@ -80,7 +80,7 @@ core::Result<std::optional<fs::path>> find_camera_file(const fs::path& folder, c
   return found.front();
 }
 
-/// A 4x4 matrix in ScanNet's intrinsic/ folder as a motion; none where it is not there or not rigid.
+/// A 4x4 matrix in ScanNet's intrinsic/ folder as a motion; none if it is missing or not rigid.
 geometry::Rigid3 scannet_extrinsic(const fs::path& file) {
   return is_file(file) ? read_pose_file(file.string()).value_or(geometry::Rigid3()) : geometry::Rigid3();
 }
@@ -214,7 +214,7 @@ core::Result<void> add_sizes(const ChosenCamera& chosen, const Layout& layout, s
   return {};
 }
 
-/// The size that most of a few images have, spread over the recording; none when none can be read.
+/// The most frequent size of a few images, spread over the recording; none if none can be read.
 std::optional<cv::Size> usual_size(const Layout& layout, bool depth) {
   constexpr std::size_t kLookedAt = 5;
   std::vector<cv::Size> sizes;
@@ -247,7 +247,7 @@ void share_calibration(const Layout& layout, sensor::Camera& camera) {
   camera.color_from_depth = geometry::Rigid3();
 }
 
-/// A camera that the layout says may be that of images of another size.
+/// Scales a camera that, according to the layout, may be that of images of another size.
 void scale_to_images(const Layout& layout, sensor::Camera& camera) {
   const auto color = usual_size(layout, false);
   if (!color || color->width == camera.color.width) return;

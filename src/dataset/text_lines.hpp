@@ -18,7 +18,7 @@ struct TextLine {
   std::vector<std::string> words;
 };
 
-/// A line as it stands, without its end.
+/// An unchanged line, without its end.
 struct RawLine {
   int number = 0;  ///< counts from 1
   std::string text;

@@ -245,7 +245,7 @@ void compare(const PreparedCloud& cloud, const Truth& truth, const CloudOptions&
   report.reference_error_m = completeness.error_m;
 }
 
-/// Numbers of a cloud that lies elsewhere say nothing about the map; say so rather than print metres.
+/// Warns if the cloud lies elsewhere, because its numbers then say nothing about the map.
 void warn_when_apart(const CloudOptions& options, CloudReport& report) {
   constexpr double kApartMm = 100.0;
   if (report.accuracy_mm.median < kApartMm) return;

@@ -16,7 +16,7 @@ namespace plumbline::evaluate {
 core::Result<void> check(const CloudOptions& options);
 core::Result<void> check(const Reference& reference);
 
-/// Finite points of a cloud; normals unit or zero, all left out when there are none worth the name.
+/// Finite points of a cloud; normals unit or zero, all left out if none is usable.
 struct PreparedCloud {
   std::unique_ptr<SurfaceSamples> samples;
   std::unique_ptr<PointIndex> index;  ///< of samples->points

@@ -66,7 +66,7 @@ bool make_template(const CornerPatch& patch, Template& to) {
   return invertible && to.inverse.allFinite();
 }
 
-/// Grey values of `level` where the patch's pixels lie; false outside the image.
+/// Grey values of `level` at the positions of the patch's pixels; false outside the image.
 bool sample(const cv::Mat& level, const Eigen::Vector2f& at, const Eigen::Matrix2f& level_from_patch,
             std::array<float, kCount>& values, float& mean) {
   const float reach_x = kReach * (std::abs(level_from_patch(0, 0)) + std::abs(level_from_patch(0, 1)));

@@ -61,7 +61,7 @@ cv::Mat gradients(const cv::Mat& gray) {
   return both;
 }
 
-// Support region of one line: where its samples lie in the gradient image.
+// Support region of one line: positions of its samples in the gradient image.
 struct Support {
   Eigen::Vector2f direction;
   Eigen::Vector2f normal;  // to the right

@@ -50,8 +50,8 @@ float depth_at(const cv::Mat& depth, double x, double y) {
 // Largest depth that may belong to the same surface as `z` a few pixels away.
 double same_surface_limit(double z) { return z * (1.0 + kSameSurface) + 4.0 * sensor::depth_sigma(z); }
 
-// Depth of the foreground surface at one place of the line: where depth jumps between the two sides, samples
-// of the nearer surface only; of those the one nearest to the line. 0 if there is none.
+// Depth of the foreground surface at one position of the line: at a depth jump between the two sides, only
+// samples of the nearer surface; of those the one nearest to the line. 0 if there is none.
 double foreground_depth(const cv::Mat& depth, const Eigen::Vector2d& p, const Eigen::Vector2d& normal,
                         const LineDepthOptions& options) {
   std::array<double, 2 * kMaxSide + 1> across{};  // 0 = not usable
@@ -109,8 +109,7 @@ bool supports(const InverseDepth& line, const Sample& sample, double gate) {
   return predicted > 0.0 && std::abs(sample.inverse - predicted) <= gate * inverse_sigma(predicted);
 }
 
-/// Samples in columns, so that many are tried at once; the last ones, up to a whole number of vectors,
-/// support nothing.
+/// Samples in columns, for vector code; the last ones, up to a whole number of vectors, support nothing.
 struct Columns {
   static constexpr std::size_t kAtATime = 8;
   std::vector<double> s;

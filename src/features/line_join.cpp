@@ -59,7 +59,7 @@ struct Glance {
     my[i] = piece.middle.y();
     length[i] = piece.length;
   }
-  /// It has no direction, so that it belongs to nothing.
+  /// Takes a piece out: without a direction it matches nothing.
   void take_out(std::size_t i) { dx[i] = dy[i] = 0.0F; }
 };
 

@@ -96,7 +96,7 @@ void keep_smooth(const std::vector<float>& roughness, std::vector<PhotometricSam
   samples.resize(kept);
 }
 
-/// Value and slope of an image where the camera sees `p`; none too near to it or to the border.
+/// Value and slope of an image at the projection of `p`; none too near to the camera or the border.
 std::optional<PhotometricSample> sample_at(const cv::Mat& image, const sensor::Pinhole& camera,
                                            const Eigen::Vector3f& p) {
   if (p.z() < kNearestSample_m) return std::nullopt;

@@ -8,7 +8,7 @@ namespace plumbline::geometry {
 std::optional<Rigid3> pose_at(const Trajectory& trajectory, double stamp, double max_gap_s) {
   const auto after = std::lower_bound(trajectory.begin(), trajectory.end(), stamp,
                                       [](const StampedPose& pose, double s) { return pose.stamp < s; });
-  // Seconds since 1970 as a double are good to 2e-7: such a difference is none, before and after.
+  // Seconds since 1970 as a double are accurate to 2e-7, so smaller differences are ignored on both sides.
   constexpr double kSame = 1e-6;
   if (after != trajectory.end() && after->stamp - stamp < kSame) return after->world_from_camera;
   if (after != trajectory.begin() && stamp - (after - 1)->stamp < kSame)

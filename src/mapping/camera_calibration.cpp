@@ -151,7 +151,7 @@ void add_stretch(const CalibrationRun& run, const geometry::Trajectory& path, co
     optimize::CalibrationPose pose;
     pose.camera_from_world = view->camera_from_world;
     pose.velocity = geometry::velocity_at(path, view->stamp);
-    // Components lie anywhere to each other: each has a pose of its own that is held.
+    // The relative poses of components are unknown: one pose of each is held.
     pose.fixed = view == begin || view->root != (view - 1)->root;
     for (const auto& [id, observation] : view->seen) {
       by_point[id].push_back(observation);

@@ -340,7 +340,7 @@ bool Slam::give_way() {
   const auto found = std::find_if(relocalised_.rbegin(), relocalised_.rend(), lies_between);
   if (found == relocalised_.rend()) return false;
 
-  // The two are joined again where the loops say.
+  // The loops join the two parts again.
   commit_bundles();
   maps::split_component(map_, *found);
   joiner_.add(map_, dispute.loops);

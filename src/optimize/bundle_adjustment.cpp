@@ -59,7 +59,7 @@ class Gate {
     for (const geometry::OrthonormalLine& line : state.lines) lines_.push_back(geometry::to_plucker(line));
   }
 
-  /// Squared standard deviations; infinite where it cannot have been seen.
+  /// Squared error in standard deviations; infinite if the observation is impossible.
   double mark(BundlePointObservation& o) const {
     PointTerm term = to_term(o);
     term.world = state_.points[static_cast<std::size_t>(o.point)];

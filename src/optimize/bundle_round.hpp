@@ -114,7 +114,7 @@ class BundleRound {
  public:
   BundleRound(const BundleProblem& problem, const BundleOptions& options);
 
-  /// Poses that edges hold are held where they are as well (holding_edges).
+  /// Holds poses that have edges at their present positions as well (holding_edges).
   void hold(const BundleState& state);
   RoundSummary run(BundleState& state);
   [[nodiscard]] std::vector<geometry::Matrix6d> covariances(const BundleState& state);

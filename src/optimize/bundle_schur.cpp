@@ -54,7 +54,7 @@ void SchurComplement::eliminate(const Family& family, std::size_t slot) {
 SchurComplement::SchurComplement(int free_poses)
     : free_(free_poses), pose_steps_(6 * free_poses), matrix_(6 * free_poses, 6 * free_poses) {}
 
-/// The right side is put where the steps will be.
+/// The right side is stored in the place of the steps.
 void SchurComplement::assemble(NormalEquations& equations, double radius) {
   equations.points.invert(radius);
   equations.lines.invert(radius);

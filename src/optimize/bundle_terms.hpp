@@ -13,7 +13,7 @@
 
 namespace plumbline::optimize {
 
-/// Squared error of a point behind the camera: constant, and so large that the gate takes it for an outlier.
+/// Squared error of a point behind the camera: constant, and so large that the gate rejects it.
 constexpr double kBehind = 2e6;
 
 /// Measurement of a point as a term; the point's position in the world is not filled in.
@@ -62,7 +62,7 @@ struct EdgeDerivatives {
 geometry::Vector6d edge_rows(const EdgeView& edge, const geometry::Rigid3& a_from_world,
                              const geometry::Rigid3& b_from_world, EdgeDerivatives* derivatives);
 
-/// L with L L^T = information, which may be singular: small and negative eigenvalues count as none.
+/// L with L L^T = information, which may be singular: small and negative eigenvalues are set to zero.
 geometry::Matrix6d square_root(const geometry::Matrix6d& information);
 
 }  // namespace plumbline::optimize

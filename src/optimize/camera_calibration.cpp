@@ -129,8 +129,7 @@ class PixelCost final : public ceres::SizedCostFunction<2, kCameraUnknowns, kSte
   const sensor::Camera* camera_;
 };
 
-/// e = (z - p_z / (1 - p_z slope.(x, y)) - delay rate) / sigma: what the depth camera says of a point that
-/// lies at p.
+/// e = (z - p_z / (1 - p_z slope.(x, y)) - delay rate) / sigma: error of the measured depth of a point at p.
 class DepthCost final : public ceres::SizedCostFunction<1, kCameraUnknowns, kStep, 3> {
  public:
   DepthCost(const CalibrationObservation& seen, const CalibrationPose& pose, double share)
@@ -200,7 +199,7 @@ void add_observations(const CalibrationProblem& problem, CameraUnknowns& unknown
   }
 }
 
-/// Poses and points to the camera as it is.
+/// Adjusts poses and points for the present camera.
 bool adjust(const CalibrationProblem& problem, CameraUnknowns& unknowns, ceres::Problem& ceres_problem) {
   auto* ordering = new ceres::ParameterBlockOrdering;  // owned by the solver's options
   for (const CalibrationObservation& o : problem.observations) {

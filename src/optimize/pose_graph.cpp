@@ -23,8 +23,8 @@ constexpr int kMostIterations = 30;   // of each least-squares solve
 constexpr int kMostRounds = 60;       // solves with changed weights
 constexpr double kRoundFactor = 1.6;  // how fast the loss turns from convex to truncated
 
-/// Every pose that is not fixed is held to where it is by 30 m and 30 rad: nothing beside a measurement, but
-/// enough for directions that no edge holds.
+/// Information that holds every free pose at its present value with 30 m and 30 rad: negligible beside a
+/// measurement, but enough for directions that no edge constrains.
 constexpr double kWeakInformation = 1e-3;
 
 /// The graph as a problem for Ceres, with a weight for each edge that may change between solves. All poses
@@ -54,7 +54,7 @@ class Solver {
                          ceres::TAKE_OWNERSHIP);
   }
 
-  /// From where the poses are. Ends where an iteration lowers the cost by a smaller share than `tolerance`.
+  /// Solves from the present poses. Ends if an iteration lowers the cost by a smaller share than `tolerance`.
   ceres::Solver::Summary solve(int max_iterations, double tolerance) {
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;

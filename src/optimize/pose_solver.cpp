@@ -90,7 +90,7 @@ void add_points(const PoseProblem& problem, const Rigid3& pose, const PoseSolver
     const Robust depth = huber(r(2) * r(2), options.plane_loss);
     cost += options.point_weight * depth.cost;
 
-    // A corner whose image does not fit has no say about depth either.
+    // The depth of a corner counts only as far as its pixel fits.
     sums.add(j.row(2), r(2), options.point_weight * depth.weight * pixel.weight);
   }
 }

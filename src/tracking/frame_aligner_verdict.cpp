@@ -32,7 +32,8 @@ bool FrameAligner::contradicts_motion_prior() {
   return true;
 }
 
-/// A handful of chance matches must not hold what a wall leaves free. Takes the problem apart.
+/// Information without families that are not trusted: a few chance matches must not hold directions that a
+/// wall leaves free. Takes the problem apart.
 geometry::Matrix6d FrameAligner::trusted_information(bool by_features, bool by_surface) {
   if (by_features == by_surface) return result_.estimate.information;
   if (by_features) problem_.planes.clear();

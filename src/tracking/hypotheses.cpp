@@ -180,8 +180,8 @@ std::optional<TrackResult> Tracker::relocalise(const maps::Map& map, const senso
   return std::nullopt;
 }
 
-/// Places can look alike: what only the thumbnail suggested must be confirmed by every family that is in use
-/// and has something to say there.
+/// Stricter check, because places can look alike: a pose that only the thumbnail suggested must be confirmed
+/// by every family that is in use and has evidence there.
 bool Tracker::passes_strict_check(const TrackResult& result, const features::FrameFeatures& features) const {
   constexpr double kMostOfTheFeatures = 0.4;  // of the landmarks that should be seen
   if (result.degenerate_directions > 0) return false;

@@ -53,8 +53,8 @@ bool hidden(const PhotometricView& view, const Eigen::Vector3f& in_depth) {
                  4.0F * static_cast<float>(sensor::depth_sigma(static_cast<double>(in_depth.z())));
 }
 
-/// Depth is not exact: where the camera has moved, a steep edge lies a fraction of a pixel off, and all of it
-/// the same way.
+/// Weakens terms by the depth noise: with inexact depth a steep edge is off by a fraction of a pixel once the
+/// camera has moved, the whole edge in the same direction.
 void weigh_by_depth(const Rigid3& camera_from_reference, optimize::PhotometricFamily& family) {
   constexpr float kCommon = 2.0F;  // neighbours have their noise in common
   const Eigen::Matrix3f rotation = camera_from_reference.rotation.cast<float>();

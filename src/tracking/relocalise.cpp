@@ -48,8 +48,8 @@ std::vector<Pair> match_all(const maps::Map& map, core::KeyframeId keyframe,
   return pairs;
 }
 
-/// OpenCV's answer is that of EPnP for all inliers, which before a plane may be decimetres off what each of
-/// them says.
+/// OpenCV's result is that of EPnP for all inliers, which in front of a plane may be off by decimetres from
+/// the individual ones.
 geometry::Rigid3 settled(const geometry::Rigid3& start, const std::vector<cv::Point3d>& world,
                          const std::vector<cv::Point2d>& pixels, const std::vector<int>& inliers,
                          const sensor::Pinhole& camera) {

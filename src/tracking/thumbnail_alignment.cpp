@@ -110,7 +110,7 @@ ThumbnailAlignment align_thumbnails(const cv::Mat& previous, const cv::Mat& prev
 
   constexpr double kLoss = 8.0;            // grey values
   constexpr double kIntensitySigma = 4.0;  // of noise and interpolation
-  // Weak belief in the guess: 5 cm, 3 degrees. It holds what the image does not show.
+  // Weak prior around the guess: 5 cm, 3 degrees. It holds directions that the image does not show.
   Vector7d belief;
   belief << 400.0, 400.0, 400.0, 365.0, 365.0, 365.0, 0.0;
   belief *= kIntensitySigma * kIntensitySigma;

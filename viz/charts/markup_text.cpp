@@ -7,7 +7,7 @@
 namespace plumbline::viz {
 namespace {
 
-/// Bytes of the character at the start of `text`, 0 where none is that may stand in a document.
+/// Bytes of the character at the start of `text`, 0 if it is not allowed in a document.
 std::size_t character_at(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(text[i]); };
   const std::uint8_t lead = byte(0);

@@ -116,7 +116,7 @@ const Trajectory& drawn_truth(const TrajectoryComparison& comparison) {
   return comparison.whole_truth.empty() ? comparison.truth : comparison.whole_truth;
 }
 
-/// The first of several that has a truth to draw, else none.
+/// The truth of the first comparison that has one to draw, else none.
 Trajectory shared_truth(const std::vector<TrajectoryComparison>& comparisons) {
   for (const auto& c : comparisons) {
     if (!drawn_truth(c).empty()) return drawn_truth(c);

@@ -11,7 +11,7 @@
 
 namespace plumbline::report {
 
-/// Distances between where something was seen and where the map has it.
+/// Distances of observations from their landmarks in the map.
 struct FamilyFit {
   std::size_t observations = 0;
   double median = 0.0;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Pieces of an HTML page. All text that is given is escaped here, but where it is called HTML.
+// Pieces of an HTML page. All given text is escaped here, except where it is called HTML.
 #include <string>
 #include <string_view>
 #include <utility>
@@ -43,7 +43,7 @@ class RobotTable {
  public:
   /// A robot's column, to be filled from the top.
   void robot(const std::string& name) { names_.push_back(name); }
-  /// A value of the robot that came last.
+  /// Adds a value of the latest robot.
   void value(const std::string& name, const std::string& value);
   [[nodiscard]] std::string html() const;
 

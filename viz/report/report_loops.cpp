@@ -106,7 +106,7 @@ std::string adjustment_html(const Json& s) {
   return table.html();
 }
 
-/// Distances of what the keyframes saw from where the finished map has it.
+/// Distances of the keyframes' observations from the landmarks of the finished map.
 std::string fit_html(const ReportData& data) {
   if (!data.fit) return {};
   HtmlTable table("what the keyframes saw|>observations|>off by, median|>nine of ten within");

@@ -12,7 +12,7 @@ namespace plumbline::report {
 
 /// Verdict, key figures, doubts about the result, input and settings.
 std::string head_html(const ReportData& data);
-/// The folder's snapshots; where it has none, drawn now. `scratch`: where a picture may be put meanwhile.
+/// The folder's snapshots; if it has none, they are drawn now. `scratch`: folder for temporary pictures.
 core::Result<std::string> pictures_html(ReportData& data, const std::filesystem::path& scratch);
 /// The map to turn and walk through; empty without a cloud. If it cannot be shown, `data` says so. Errors
 /// (kInput): request.other cannot be read.

@@ -76,7 +76,7 @@ class RobotCharts {
   [[nodiscard]] bool is_tracked(std::size_t i) const {
     return table_.text(frames_.rows[i], table_.column("state")) == "tracked";
   }
-  /// NaN where the frame was not tracked, or has nothing of it: the first frame has no residuals.
+  /// NaN if the frame was not tracked, or has no value: the first frame has no residuals.
   [[nodiscard]] std::vector<double> column(const std::string& name) const {
     std::vector<double> values;
     const std::size_t index = table_.column(name);

@@ -122,7 +122,8 @@ PointColors base_colors(const Scene& scene, const std::vector<std::uint32_t>& po
   return result;
 }
 
-/// Normals summed over cubes: which way the surface round a point faces, whatever its own noisy normal says.
+/// Normals summed over cubes: the direction that the surface around a point faces, independent of its own
+/// noisy normal.
 class Surroundings {
  public:
   explicit Surroundings(const Scene& scene, std::size_t step) {

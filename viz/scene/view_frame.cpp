@@ -106,7 +106,7 @@ Eigen::Vector3d Projection::to_viewer(const Eigen::Vector3d& p) const {
   return orthographic ? Eigen::Vector3d(-forward) : Eigen::Vector3d((eye - p).normalized());
 }
 
-/// From above and beside: to the left, unless that shows the backs of what the cameras saw.
+/// Obliquely from above: from the left, unless that shows the backs of the surfaces that the cameras saw.
 static Eigen::Vector3d iso_forward(const SceneAxes& axes) {
   const double side = axes.heading.dot(axes.right) > kHeadsRight ? 1.0 : -1.0;
   return std::cos(kIsoPitch) *
@@ -173,7 +173,7 @@ void fit(Projection& projection, const std::vector<Eigen::Vector3d>& points,
   }
   projection.eye = centre - distance * projection.forward;
 
-  // Points left out by that may stick out; half the depth again holds them without wasting depth precision.
+  // Some points may lie outside; half as much depth again includes them without wasting depth precision.
   projection.near_m = std::max(distance - 1.0 * depth, 0.05 * distance);
   projection.far_m = distance + 1.5 * depth;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Evidence of views about points that are not on their surfaces: nothing can be where a view looks through.
+// Evidence of views against points that are not on their surfaces: a view looks through free space only.
 #include <Eigen/Core>
 #include <cstdint>
 #include <vector>

@@ -93,7 +93,7 @@ class VoxelMap {
 
   /// Fuses one view: one observation of every voxel it touches.
   void insert(const Cloud& camera_cloud, const geometry::Rigid3& world_from_cloud);
-  /// The same for what measured() gave, as far as it lies in `region` (voxels, both ends included).
+  /// The same for the samples of measured() that lie in `region` (voxels, both ends included).
   void insert(const std::vector<VoxelSample>& view, const Eigen::AlignedBox3i& region);
   /// Fuses points again that were fused before and have moved since. A voxel counts as many observations as
   /// its most seen point. In the order of points().

@@ -22,7 +22,7 @@ namespace plumbline::core {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// Thrown by ByteReader, and caught where a thing is decoded: it names what the bytes say wrongly.
+/// Thrown by ByteReader, and caught where an object is decoded; it names the error in the bytes.
 struct BadBytes : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -237,7 +237,7 @@ Bytes encoded(const T& thing) {
   encode(thing, bytes);
   return bytes.bytes();
 }
-/// Throws BadBytes, also when there are more bytes than the thing has.
+/// Throws BadBytes, also if there are more bytes than the object needs.
 template <typename T>
 T decode(const Bytes& bytes) {
   ByteReader from(bytes);
@@ -246,7 +246,7 @@ T decode(const Bytes& bytes) {
   from.expect_end();
   return thing;
 }
-/// Things that stand one behind the other. Throws BadBytes.
+/// Objects one after another. Throws BadBytes.
 template <typename T>
 std::vector<T> decode_page(const Bytes& bytes) {
   std::vector<T> things;

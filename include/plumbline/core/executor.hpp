@@ -20,7 +20,7 @@ class Executor {
 
   [[nodiscard]] int threads() const;
 
-  /// Calls body(i) for i in [0, count), in any order; returns when all are done. Rethrows what body throws.
+  /// Calls body(i) for i in [0, count), in any order; returns when all are done. Rethrows exceptions of body.
   void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body) const;
 
   /// Work that runs beside the caller. Destroying a Job waits for it. wait() runs the job itself if it has
@@ -35,7 +35,7 @@ class Executor {
     [[nodiscard]] bool valid() const;
     /// True if the work is done already; false for a Job without work.
     [[nodiscard]] bool ready() const;
-    /// Returns when the work is done; rethrows what it threw.
+    /// Returns when the work is done; rethrows its exception.
     void wait();
 
    private:

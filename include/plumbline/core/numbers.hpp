@@ -37,7 +37,7 @@ inline bool has_decimal_comma(const std::vector<std::string>& words) {
   return words.size() > 1 && std::any_of(words.begin(), words.end(), decimal);
 }
 
-/// The upper of both where their number is even. There must be one, and none may be NaN.
+/// The median, the upper one if their number is even. There must be at least one value, and no NaN.
 template <typename T>
 T median(std::vector<T> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

@@ -60,7 +60,7 @@ class OptionTable {
   template <typename Enum>
   OptionTable& choice(std::string key, Enum& value, std::vector<std::pair<std::string, Enum>> allowed,
                       std::string help);
-  /// A file's name, or the list that would stand in the file. The owner reads the tree.
+  /// Name of a file, or the list that the file would contain. The owner reads the tree.
   OptionTable& text_or_list(std::string key, ConfigNode& value, std::string list_of, std::string help);
 
   /// Reads one value; `path` is the dotted path of the map that holds the key. Numbers may carry a unit ("5

@@ -112,7 +112,7 @@ enum class PoseUse {
   kIgnore,  ///< for nothing but comparison: truth() has them all the same
 };
 
-/// Topics of a bag; "" is found by itself.
+/// Topics of a bag; "" is found automatically.
 struct TopicNames {
   std::string color;
   std::string depth;
@@ -125,8 +125,8 @@ struct TopicNames {
 
 /// Options of live sources.
 struct LiveOptions {
-  /// Opens the stream behind an address, and takes the topics that the address names; empty: nothing live is
-  /// taken.
+  /// Opens the stream of an address, and sets the topics that the address names; empty: live sources are
+  /// refused.
   std::function<core::Result<std::unique_ptr<MessageStream>>(const std::string& address, TopicNames& topics)>
       open;
   core::StopToken stop;                      ///< ends the source; numbered frames are still read

@@ -17,7 +17,7 @@ struct LiveFramesOptions {
   std::string name = "live";
 };
 
-/// One pair of images as a camera gives it.
+/// One pair of images from a camera.
 struct LiveFrame {
   double stamp = 0.0;                 ///< of colour, seconds
   std::optional<double> depth_stamp;  ///< as the camera stamps it, without its depth_delay_s; none: `stamp`

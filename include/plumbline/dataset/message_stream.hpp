@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Messages of ROS as they come and go over a network, whatever carries them: plumbline::net has ROS 2's.
+// ROS messages received and sent over a network of any kind: plumbline::net implements ROS 2's.
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -37,7 +37,7 @@ class MessageStream {
   virtual void unsubscribe(const std::string& topic) = 0;
   /// The next message of any topic; none if none arrives in time.
   virtual std::optional<StreamMessage> next(std::chrono::milliseconds most) = 0;
-  /// Messages that came too fast for next(), or that the network lost and said so.
+  /// Number of messages that came too fast for next(), or that the network reported as lost.
   [[nodiscard]] virtual std::size_t lost() const = 0;
 };
 

@@ -27,8 +27,7 @@ struct TrajectoryReading {
 /// columns, not a number, decimal commas, zero quaternion, not a rotation; no finite row at all.
 core::Result<TrajectoryReading> read_trajectory_file(const std::filesystem::path& file);
 
-/// The poses alone, of a file that has stamps (without: kInput). `notes`, if given, gets those of the
-/// reading.
+/// Only the poses, of a file with stamps (without: kInput). `notes`, if given, gets the notes of reading.
 core::Result<geometry::Trajectory> read_trajectory(const std::filesystem::path& file,
                                                    std::vector<std::string>* notes = nullptr);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Trajectories that lie beside a cloud and its reference.
+// Trajectories stored beside a cloud and its reference.
 #include <filesystem>
 #include <string>
 #include <vector>

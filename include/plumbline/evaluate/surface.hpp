@@ -28,7 +28,7 @@ struct TriangleMesh {
   std::vector<std::uint8_t> visible;  ///< per vertex; empty or as long as `vertices`
 };
 
-/// Truth: a mesh when it has triangles, else samples.
+/// Truth: a mesh if it has triangles, else samples.
 struct Reference {
   std::string name;  ///< for messages
   SurfaceSamples samples;
@@ -45,8 +45,8 @@ core::Result<Reference> load_reference(const std::filesystem::path& file);
 /// them.
 core::Result<SurfaceSamples> load_cloud(const std::filesystem::path& file);
 
-/// Points and normals of a cloud in memory, in its order; a normal is zero where it is unknown, all are left
-/// out when none is known.
+/// Points and normals of a cloud in memory, in its order; unknown normals are zero, and all are left out if
+/// none is known.
 SurfaceSamples samples_of(const cloud::Cloud& cloud);
 
 /// Moves points and normals.

@@ -18,8 +18,8 @@ struct CornerPatch {
   static constexpr int kSide = 2 * kReach + 3;  ///< one more on each side, for gradients
   static constexpr int kPixels = kSide * kSide;
   Eigen::Vector2f middle = Eigen::Vector2f::Zero();  ///< position at which it was cut out, in the full image
-  /// From there to what the feature stands for, pixels of the full image: zero for the corner itself; where
-  /// a known landmark was aligned, to where that is.
+  /// Offset from the middle to the position of the feature, pixels of the full image: zero for the corner
+  /// itself; if a known landmark was aligned, to the landmark.
   Eigen::Vector2f offset = Eigen::Vector2f::Zero();
   /// All zero: no patch, as at depth borders (FeatureExtractor); nothing is aligned with it.
   std::array<std::uint8_t, kPixels> gray{};

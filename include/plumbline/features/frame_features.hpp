@@ -46,8 +46,9 @@ struct FrameFeatures {
   std::vector<Eigen::Vector2f> slants;
   PointGrid grid;
   std::vector<LineFeature> lines;
-  /// Motion of the camera (m, rad, its own frame) while the image was read, as far as it was taken out of the
-  /// features: they lie where an image taken all at once shows them. Zero: they lie as they were read.
+  /// Motion of the camera (m, rad, its own frame) while the image was read, as far as the features are
+  /// corrected for it: they are at their positions in an image taken all at once. Zero: they are not
+  /// corrected.
   geometry::Vector6d shutter_motion = geometry::Vector6d::Zero();
   cv::Mat thumbnail;        ///< CV_32FC1, kThumbnailWidth wide, blurred grey values
   cv::Mat thumbnail_depth;  ///< CV_32FC1 of the same size, metres, 0 = none
@@ -55,7 +56,7 @@ struct FrameFeatures {
   /// True if points or lines were extracted.
   [[nodiscard]] bool extracted() const { return grid.made(); }
 
-  /// Depth of point `i`'s surface `shift` pixels beside it, metres; 0 where there is none.
+  /// Depth of point `i`'s surface `shift` pixels beside it, metres; 0 if unknown.
   [[nodiscard]] float depth_beside(std::size_t i, const Eigen::Vector2f& shift) const {
     const float depth = points[i].depth;
     if (slants.size() != points.size()) return depth;

@@ -22,10 +22,10 @@ using PhotometricImage = std::array<cv::Mat, kPhotometricLevels>;
 /// `gray`: CV_8UC1.
 PhotometricImage make_photometric_image(const cv::Mat& gray);
 
-/// The camera that would take a level's image; level 0 has half of the image's size.
+/// The camera of a level's image; level 0 has half of the image's size.
 sensor::Pinhole photometric_camera(const sensor::Pinhole& camera, std::size_t level);
 
-/// A place on a surface and what the image shows there.
+/// A point on a surface with its grey value and gradient.
 struct PhotometricSample {
   Eigen::Vector3f point = Eigen::Vector3f::Zero();     ///< camera frame, metres
   float value = 0.0F;                                  ///< of the level's image

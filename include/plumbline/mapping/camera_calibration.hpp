@@ -63,7 +63,7 @@ core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRu
                                                  const CalibrationOptions& options,
                                                  const core::Executor& executor);
 
-/// The numbers of `found` against those of `given`; used where they differ. Standard deviations and gains are
+/// Differences of `found` from `given`; marked as used where they differ. Standard deviations and gains are
 /// not known.
 std::vector<CameraFinding> findings_between(const sensor::Camera& given, const sensor::Camera& found);
 

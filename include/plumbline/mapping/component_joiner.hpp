@@ -31,8 +31,8 @@ class ComponentJoiner {
   ComponentJoiner(const sensor::Pinhole& camera, const core::Executor& executor)
       : camera_(camera), executor_(&executor) {}
 
-  /// Holds a keyframe against those of other components that look like it, as `places` says. What it returns
-  /// is certain; none while it is not.
+  /// Compares a keyframe with similar ones of other components, found in `places`. A returned overlap is
+  /// certain; none as long as it is not.
   std::optional<ComponentOverlap> look_up(const maps::Map& map, core::KeyframeId keyframe,
                                           const places::Database& places);
   /// Pairs of keyframes of different components that were verified elsewhere; look_up() decides about them.

@@ -52,7 +52,7 @@ class LocalMapper {
   LocalMapper(const LocalMapperOptions& options, const sensor::Pinhole& camera, std::int32_t robot)
       : options_(options), camera_(camera), robot_(robot), culler_(options.culling) {}
 
-  /// Goes on where another mapper left `map`, whose newest keyframe is `newest`.
+  /// Continues with the `map` of another mapper, whose newest keyframe is `newest`.
   void restore(const maps::Map& map, core::KeyframeId newest) { culler_.restore(map, newest); }
 
   /// Adds a keyframe: observations of the landmarks it tracked, new landmarks from its depth, where older

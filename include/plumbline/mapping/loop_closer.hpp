@@ -86,9 +86,9 @@ class PendingLoops {
  public:
   /// `patience`: number of keyframes for which a verified loop waits for another one.
   explicit PendingLoops(int patience = 6) : patience_(patience) {}
-  /// Adds those of `keyframe`, which is new in the queries' map. The largest consistent set of the loops
-  /// found lately, with `keyframe` in it, when it holds enough keyframes and no other set comes near; then
-  /// none is left waiting.
+  /// Adds the loops of `keyframe`, which is new in the queries' map. Returns the largest consistent set of
+  /// recent loops that includes `keyframe`, if it has enough keyframes and no other set is nearly as large;
+  /// then no loop is left waiting.
   std::vector<Loop> confirm(const maps::Map& matches, const maps::Map& queries, core::KeyframeId keyframe,
                             const std::vector<Loop>& verified, const LoopOptions& options);
 

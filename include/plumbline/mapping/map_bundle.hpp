@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A bundle of a map's keyframes and landmarks, a few or all, and what goes back into the map.
+// A bundle of a map's keyframes and landmarks, a few or all, and the way back into the map.
 #include <vector>
 
 #include "plumbline/maps/map.hpp"
@@ -18,7 +18,7 @@ struct MapBundle {
   std::vector<maps::Observation> line_seen;   ///< of problem.line_observations
 };
 
-/// Points and lines go to where they were adjusted, if they are in the map still.
+/// Moves points and lines to their adjusted positions, if they are still in the map.
 void put_back_landmarks(const MapBundle& bundle, maps::Map& map);
 
 /// Observations that did not fit go, unless the feature is another landmark's by now; with their last one

@@ -47,7 +47,7 @@ struct RobotPlace {
 
 class MergeServer {
  public:
-  /// `lag`: frames of the log between taking keyframes and committing what comes of them. The executor must
+  /// `lag`: frames of the log between taking keyframes and committing their results. The executor must
   /// outlive this.
   MergeServer(const MapFusionOptions& options, int lag, const core::Executor& executor);
 
@@ -59,7 +59,7 @@ class MergeServer {
   void add(std::shared_ptr<const maps::Map> map, core::KeyframeId keyframe, std::int64_t frame);
   /// Events that are to be committed at this frame; mostly none. To be called for every frame, after add().
   std::vector<MeetingEvent> commit(std::int64_t frame);
-  /// All that is left, when the log has ended.
+  /// All remaining events, when the log has ended.
   std::vector<MeetingEvent> finish();
 
   /// Pose of the robot as of the last commit; none if it has met no other robot.

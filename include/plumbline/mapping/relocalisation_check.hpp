@@ -10,7 +10,7 @@
 
 namespace plumbline::mapping {
 
-/// A map of nothing but one frame, as keyframe 0 of `robot` in the origin: what places are verified with.
+/// A map of one single frame, as keyframe 0 of `robot` in the origin; for verifying places.
 maps::Map image_map(const sensor::RgbdFrame& frame, std::shared_ptr<const features::FrameFeatures> features,
                     const sensor::Pinhole& camera, const tracking::SurfaceSamplerOptions& surface);
 

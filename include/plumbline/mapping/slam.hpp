@@ -89,8 +89,8 @@ class Slam {
   void recalibrate(const sensor::Camera& camera, const PictureReader& read);
   [[nodiscard]] const sensor::Camera& camera() const { return camera_; }
 
-  /// From now on maps of other robots serve for relocalisation and loops (without loops: for nothing). What
-  /// comes in there, and when, decides what becomes of this map.
+  /// From now on maps of other robots are used for relocalisation and loops (without the option loops: for
+  /// nothing). This map then depends on the received maps and their times.
   void use(std::shared_ptr<const OtherMapsInbox> others) {
     if (options_.loops.enabled) closer_.use(std::move(others));
   }
@@ -104,7 +104,7 @@ class Slam {
   /// All components (maps/components.hpp).
   [[nodiscard]] const maps::Map& map() const { return map_; }
   [[nodiscard]] const std::vector<ComponentJoin>& joins() const { return joins_; }
-  /// Loops that agree against the path and have no relocalisation between them that could give way.
+  /// Loops that agree against the path, without a relocalisation between them that could be taken back.
   [[nodiscard]] const std::vector<LoopDispute>& disputes() const { return closer_.disputes(); }
   /// Relocalisations that were taken back because loops agreed against them.
   [[nodiscard]] int taken_back() const { return taken_back_; }
@@ -113,7 +113,7 @@ class Slam {
   [[nodiscard]] int refused() const { return bundle_.refused() + closer_.counts().refused; }
   /// Every place that was verified, with its evidence.
   [[nodiscard]] const std::vector<LoopTrial>& loop_trials() const { return closer_.trials(); }
-  /// Keyframes by what they look like; empty without loops.
+  /// Keyframes by appearance; empty without loops.
   [[nodiscard]] const places::Database& places() const { return closer_.database(); }
   /// The tracker's result for the last frame; for drawing it.
   [[nodiscard]] const tracking::TrackResult& last_track() const { return last_track_; }

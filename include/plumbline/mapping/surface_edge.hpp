@@ -25,11 +25,11 @@ struct EdgeImages {
 };
 
 /// `a` lies `b_from_a` before `b`, whose depth image (CV_32FC1, metres) is `depth_of_b`; `depth_from_camera`
-/// carries b's colour camera to its depth camera. The start is held to `hold_m` metres, and as much at the
-/// middle of what both see when turned: along what the surfaces leave open, a wall's length, they would
-/// otherwise slide by decimetres on noise alone, and an edge whose free directions have run away is wrong in
-/// those that are held, too. The edge itself is freed of this hold: where the surfaces say anything it is
-/// what they say. None when they overlap by less than min_overlap.
+/// transforms from b's colour camera to its depth camera. The start is held to `hold_m` metres, and rotation
+/// to the same motion at the middle of the common view: along directions that the surfaces leave free, such
+/// as a wall's length, the alignment would otherwise slide by decimetres on noise alone, and an edge that has
+/// slid is wrong in the held directions, too. The edge itself is freed of this hold, so that only the
+/// surfaces count in the directions that they constrain. None if they overlap by less than min_overlap.
 std::optional<maps::SurfaceEdge> align_surface_edge(
     const maps::Keyframe& a, core::KeyframeId b, const cv::Mat& depth_of_b, const geometry::Rigid3& b_from_a,
     const geometry::Rigid3& depth_from_camera, const sensor::Pinhole& camera,

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Surface edges of a new keyframe (surface_edge.hpp), measured beside the tracker. Everything that is
-// measured with is taken when the keyframe is made, so that the edges do not depend on when the work is done.
+// Surface edges of a new keyframe (surface_edge.hpp), measured beside the tracker. All inputs are copied when
+// the keyframe is made, so that the edges do not depend on the time of the work.
 #include <memory>
 #include <opencv2/core/mat.hpp>
 #include <vector>

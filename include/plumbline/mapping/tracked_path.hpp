@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The way from keyframe to keyframe as the tracker saw it: what adjustments of the map must not contradict.
+// The path from keyframe to keyframe as measured by the tracker, which adjustments of the map must not
+// contradict.
 #include <optional>
 #include <string>
 #include <utility>
@@ -14,7 +15,7 @@ namespace plumbline::mapping {
 /// New poses of keyframes: camera_from_world.
 using KeyframePoses = std::vector<std::pair<core::KeyframeId, geometry::Rigid3>>;
 
-/// Two neighbours on the way that new poses would tear apart.
+/// Two neighbours on the path that new poses would tear apart.
 struct Contradiction {
   core::KeyframeId a;
   core::KeyframeId b;

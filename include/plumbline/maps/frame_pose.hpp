@@ -44,7 +44,8 @@ struct FramePose {
   std::shared_ptr<const SeenPoints> seen = nullptr;
 };
 
-/// A step between neighbouring frames of the path as it lies now, beside the one that the tracker saw.
+/// A step between neighbouring frames of the present path, with its difference from the tracker's
+/// measurement.
 struct PathStep {
   double stamp = 0.0;     ///< of the later frame, seconds
   core::KeyframeId from;  ///< reference of the earlier frame
@@ -67,7 +68,7 @@ PathCheck check_path(const std::vector<FramePose>& frames, const Map& map);
 /// True if a step that the tracker knows to `sigma_m` cannot be off by this much.
 bool beyond_noise(double off_m, double off_rad, double sigma_m);
 
-/// World poses of the tracked frames, in the order given, as their keyframes lie in `map` now.
+/// World poses of the tracked frames, in the given order, from the present poses of their keyframes in `map`.
 geometry::Trajectory trajectory(const std::vector<FramePose>& frames, const Map& map);
 
 struct KeyframePose {
@@ -88,7 +89,7 @@ struct MapPoses {
   std::vector<KeyframePose> keyframes;  ///< by id
 };
 
-/// All poses as they lie in `map` now; frames in the order given.
+/// All present poses in `map`; frames in the given order.
 MapPoses poses_of(const Map& map, const std::vector<FramePose>& frames);
 
 /// The trajectory of each robot.

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Container of things named by core::Id: constant-time look-up, iteration in order of id. What is erased
-// leaves four bytes behind, so that a map in which landmarks come and go does not grow with the length of a
-// run. It knows which pages of ids were touched lately, so that stores can follow at the cost of what
-// changed.
+// Container of objects named by core::Id: constant-time look-up, iteration in order of id. An erased object
+// leaves four bytes behind, so that a map does not grow with the length of a run although landmarks come and
+// go. It records which pages of ids were changed lately, so that stores can follow at a cost that depends on
+// the changes only.
 #include <cstdint>
 #include <deque>
 #include <map>

@@ -52,8 +52,8 @@ struct Keyframe {
 struct Observation {
   KeyframeId keyframe;
   int feature : 31;
-  /// The feature's pixel is that of what the landmark was made of, to a tenth of a pixel or so (its first
-  /// feature, and those that were aligned with its patch); else of some corner there.
+  /// True if the feature's pixel is that of the landmark's own point, to about a tenth of a pixel (its first
+  /// feature, and those that were aligned with its patch); false if it is just some corner there.
   bool aligned : 1;
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wconversion"
@@ -104,10 +104,10 @@ struct KeyframeEdge {
 };
 /// Edge from the alignment of their surfaces; singular where these do not constrain all directions.
 using SurfaceEdge = KeyframeEdge;
-/// A place that was seen again: as their landmarks say.
+/// A place that was seen again, according to its landmarks.
 using LoopEdge = KeyframeEdge;
 
-/// The ids that come next, one of each robot that has or had such things.
+/// The next ids, for each robot that has or had such objects.
 struct NextIds {
   std::vector<KeyframeId> keyframes;
   std::vector<PointId> points;
@@ -237,7 +237,8 @@ class Map {
   /// Keyframes that share at least `min_shared` landmarks with `keyframe`, most first, ties by id. If there
   /// are none, the ones that share most.
   [[nodiscard]] std::vector<std::pair<KeyframeId, int>> covisible(KeyframeId keyframe, int min_shared) const;
-  /// Covisible keyframes, those that share most first, `count` at most; none of a keyframe that is not there.
+  /// Covisible keyframes, those that share most first, `count` at most; empty for a keyframe that does not
+  /// exist.
   [[nodiscard]] std::vector<KeyframeId> neighbours(KeyframeId keyframe, std::size_t count) const;
 
   /// Landmarks that both see.

@@ -49,7 +49,7 @@ struct StoreHeader {
   int format = kStoreFormat;      ///< set by the reader; the writer always writes kStoreFormat
 };
 
-/// The camera of a robot; of one that is not there the first one's, or none.
+/// The camera of a robot; for a robot that does not exist the first one's, or none.
 sensor::Camera camera_of(const std::vector<RobotInfo>& robots, std::int32_t robot);
 
 /// The frame that results are written in, as far as it is known.

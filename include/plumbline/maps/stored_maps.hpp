@@ -16,7 +16,7 @@
 
 namespace plumbline::maps {
 
-/// One store. Its robots have been given numbers that no other one's have.
+/// One store. Its robots are renumbered so that no two stores have the same number.
 struct StoredPart {
   std::string name;  ///< of its folder
   std::filesystem::path file;

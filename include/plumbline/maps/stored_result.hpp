@@ -42,7 +42,7 @@ class StoredResult {
   [[nodiscard]] const StoredMap& stored() const { return map_; }
   /// Tracked frames, by robot, then time.
   [[nodiscard]] geometry::Trajectory trajectory() const { return poses().trajectory; }
-  /// By id; also such as left the map.
+  /// Keyframes by id, including those that have left the map.
   [[nodiscard]] std::vector<KeyframePose> keyframes() const { return poses().keyframes; }
   [[nodiscard]] geometry::Trajectory keyframe_trajectory() const { return maps::trajectory(keyframes()); }
   [[nodiscard]] std::vector<LineSegment3> lines() const;

@@ -53,7 +53,7 @@ struct PoseGraphSummary {
 /// non-convexity; else every edge counts.
 PoseGraphSummary solve_pose_graph(PoseGraph& graph, bool robust = true);
 
-/// Number of eigenvalues that are not next to nothing beside the largest one (less than 1e-9 of it).
+/// Number of eigenvalues that are not negligible (at least 1e-9 of the largest one).
 int rank_of(const geometry::Matrix6d& information);
 
 /// Squared error that a measurement of `dimensions` (1-6) directions exceeds once in a thousand times.

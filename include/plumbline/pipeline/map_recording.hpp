@@ -36,8 +36,8 @@ struct MapRequest : RunRequest {
   /// Called before the first frame with the folder that the run writes into, where map.db will be, and again
   /// if the run starts again with another camera: nothing earlier is there then. May be empty.
   std::function<void(const std::filesystem::path&)> prepared;
-  /// Maps of other robots that the trackers use for relocalisation and loops: the result depends on what
-  /// comes in there, and when; null: none do.
+  /// Maps of other robots that the trackers use for relocalisation and loops: the result depends on the
+  /// received maps and their times; null: none.
   std::shared_ptr<const mapping::OtherMapsInbox> feedback;
   /// For tests: changes the map when tracking has ended; may be empty.
   std::function<void(maps::Map&)> alter_map;

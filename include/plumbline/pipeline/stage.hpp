@@ -95,7 +95,7 @@ class StageIo {
   [[nodiscard]] std::shared_ptr<const T> input(const std::string& name) const {
     return std::static_pointer_cast<const T>(in_[find<T>(inputs_, name)]);
   }
-  /// Leave an output out to say "nothing for this frame".
+  /// Sets an output; an output that is not set has no value for this frame.
   template <typename T>
   void output(const std::string& name, std::shared_ptr<const T> value) {
     out_[find<T>(outputs_, name)] = std::move(value);
@@ -196,7 +196,8 @@ struct CheckContext {
 
   /// A file named in a pipeline: absolute, beside the pipeline file, or shipped. Empty when there is none.
   [[nodiscard]] std::filesystem::path find(const std::string& file) const;
-  /// For a value of an included pipeline: beside that one; of --set: first where the program runs.
+  /// Resolves a file for a value of an included pipeline beside that one, and for --set first in the working
+  /// directory.
   [[nodiscard]] std::filesystem::path find(const std::string& file, const core::ConfigMark& mark) const;
 };
 

@@ -27,9 +27,9 @@ struct Clusters {
   std::vector<int> member_of;  ///< by descriptor
 };
 
-/// At most `k` clusters, none empty, centres all different; fewer when the descriptors differ less. First
-/// centres are spread like those of k-means++ (drawn with `seed`), then `iterations` rounds. Ties go to the
-/// first centre. Deterministic.
+/// At most `k` clusters, none empty, all centres different; fewer if there are fewer different descriptors.
+/// First centres are spread like those of k-means++ (drawn with `seed`), then `iterations` rounds. Ties go to
+/// the first centre. Deterministic.
 Clusters k_majority(const std::vector<features::Descriptor256>& descriptors, int k, int iterations,
                     std::uint64_t seed);
 

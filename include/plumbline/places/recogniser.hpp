@@ -34,7 +34,7 @@ struct Candidate {
 /// maps::Map, or from several.
 using Neighbours = std::function<std::vector<core::KeyframeId>(core::KeyframeId)>;
 
-/// Remembers what the last queries of each robot found.
+/// Recognises places; keeps the results of each robot's last queries.
 class Recogniser {
  public:
   explicit Recogniser(const RecogniserOptions& options) : options_(options) {}

@@ -41,7 +41,7 @@ struct Lens {
   /// The inverse of distort(), by Newton's method, exact to 1e-9 inside the image. Outside of where the model
   /// is invertible it is the last step.
   [[nodiscard]] Eigen::Vector2d undistort(const Eigen::Vector2d& distorted) const;
-  /// undistort() where it is one: none where no ray comes out so, as beyond the rim of a lens.
+  /// undistort() if it is valid: none if no ray is distorted to that position, as beyond the rim of a lens.
   [[nodiscard]] std::optional<Eigen::Vector2d> ray_of(const Eigen::Vector2d& distorted) const;
 
   bool operator==(const Lens& other) const { return model == other.model && k == other.k; }

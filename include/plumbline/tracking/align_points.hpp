@@ -9,9 +9,9 @@
 
 namespace plumbline::tracking {
 
-/// Sets `shift` and `aligned` of those matches whose landmark a keyframe saw from nearly the same side and
-/// distance, oldest first, and where the images agree (features::align_patch); clears those of the others.
-/// `frame` needs its levels.
+/// Sets `shift` and `aligned` of matches whose landmark was seen by a keyframe from nearly the same side and
+/// distance (oldest first), if the images agree (features::align_patch); clears those of the others. `frame`
+/// needs its levels.
 void align_points(const maps::Map& map, const features::FrameFeatures& frame, const sensor::Pinhole& camera,
                   const geometry::Rigid3& camera_from_world, double scale_factor,
                   std::vector<PointMatch>& matches);

@@ -29,11 +29,11 @@ class MotionModel {
   void lost();
   /// Takes back all poses found after the first `frames` lost ones.
   void lost_since(int frames) { lost_frames_ = frames; }
-  /// The camera turned up elsewhere: the past says nothing.
+  /// Forgets the past, because the camera was found elsewhere.
   void reset();
   /// Goes on from a keyframe, with this velocity of camera_from_world per second.
   void restore(double stamp, const geometry::Vector6d& velocity);
-  /// The map was corrected: where the last pose lies now.
+  /// Sets the new position of the last pose after a correction of the map.
   void set_camera_from_world(const geometry::Rigid3& pose) { camera_from_world_ = pose; }
   [[nodiscard]] const geometry::Rigid3& camera_from_world() const { return camera_from_world_; }
 

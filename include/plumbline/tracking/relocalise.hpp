@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Pose from nothing but what the image looks like: descriptors against keyframes, then P3P in RANSAC; or,
-// without any feature, the small image against those of the keyframes.
+// Pose from appearance alone: descriptors against keyframes, then P3P in RANSAC; or, without any feature, the
+// small image against those of the keyframes.
 #include <cstdint>
 #include <optional>
 #include <vector>

@@ -107,11 +107,12 @@ class Tracker {
   /// Adapts the intensities that are kept of keyframes to a refined camera.
   void recalibrate(const sensor::Recalibration& change) { photometric_.recalibrate(change); }
 
-  /// The map has changed, or another keyframe becomes the reference: where the last pose lies now.
+  /// Sets the new position of the last pose, because the map has changed or another keyframe becomes the
+  /// reference.
   void map_changed(const maps::Map& map, core::KeyframeId reference,
                    const geometry::Rigid3& last_camera_from_world);
 
-  /// The frame that was tracked last became a keyframe: what comes next is aligned with its intensities.
+  /// Makes the last tracked frame a keyframe: later frames are aligned with its intensities.
   void add_keyframe(core::KeyframeId id, const sensor::RgbdFrame& frame, const TrackResult& result);
   [[nodiscard]] const PhotometricKeyframes& photometric() const { return photometric_; }
 

@@ -28,7 +28,7 @@ std::string page(const Scene& scene, const std::string& generator, Cost* cost = 
 
 /// One cloud as JSON, its data in it: a piece that a live page is sent. `z_up` as Scene::z_up.
 std::string cloud_json(const Points& points, bool z_up);
-/// A place as the page has it: z up.
+/// A position in the page's axes: z up.
 Eigen::Vector3d upright(const Eigen::Vector3d& place, bool z_up);
 
 }  // namespace plumbline::viewer

@@ -20,7 +20,7 @@ enum class Scale {
   kView          ///< whole numbers: the keyframe (its place in Scene::keyframes) that saw the point best
 };
 
-/// A value of every point besides place and colour.
+/// A value of every point besides position and colour.
 struct Layer {
   std::string key;    ///< of letters, unique: "confidence"
   std::string label;  ///< for people: "Confidence"

@@ -51,7 +51,7 @@ struct SnapshotOptions {
   void declare(core::OptionTable& table);
 };
 
-/// Mean of the cameras' up directions (-y of theirs), unit; -y when nothing is known.
+/// Mean of the cameras' up directions (-y of each camera), unit; -y if nothing is known.
 Eigen::Vector3d mean_camera_up(const std::vector<geometry::Trajectory>& paths);
 
 /// Up direction of a scene: that of the floor (cloud::find_floor, about the cameras' mean up), or the mean

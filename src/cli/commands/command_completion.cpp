@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Names from the shipped files, the registries and results. What cannot be read gives none.
+/// Names from the shipped files, the registries and results. Sources that cannot be read give none.
 class ShippedNames : public NameSource {
  public:
   explicit ShippedNames(const Session& session) : session_(session) {

@@ -39,7 +39,7 @@ struct Rays {
   std::vector<float> x, y;
 };
 
-/// The rays of an organised cloud; none when some point lies off them by more than an eighth of a step.
+/// The rays of an organised cloud; none if some point is off its ray by more than an eighth of a step.
 std::optional<Rays> rays_of(const Cloud& cloud, double step_m) {
   if (cloud.height < 2 || cloud.width < 2) return std::nullopt;
   Rays rays{std::vector<float>(cloud.width, kNan), std::vector<float>(cloud.height, kNan)};

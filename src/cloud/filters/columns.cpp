@@ -47,7 +47,7 @@ std::vector<std::size_t> finite_indices(const Cloud& cloud) {
   return indices;
 }
 
-/// Organised clouds keep their shape: every point is where it was, or gone.
+/// Organised clouds keep their shape: every point is at its old index, or removed.
 bool same_places(const Cloud& before, const Cloud& after) {
   if (before.size() != after.size()) return false;
   for (std::size_t i = 0; i < after.size(); ++i) {

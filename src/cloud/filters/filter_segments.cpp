@@ -24,7 +24,7 @@ enum class PlaneFit { kNever, kOnce, kSpread };
 enum class Mode { kKeep, kRemove, kLabel };
 constexpr int kNoSegment = -1;
 
-/// Segment of every finite point of `input`, in their order, made into what `mode` says.
+/// Cloud for `mode`, from the segment of every finite point of `input`, in order.
 CloudPtr by_segment(const Cloud& input, const std::vector<int>& segments, Mode mode) {
   std::size_t next = 0;
   if (mode != Mode::kLabel) {
@@ -49,7 +49,7 @@ CloudPtr by_segment(const Cloud& input, const std::vector<int>& segments, Mode m
   return output;
 }
 
-/// Points on a line, or fewer than three places: PCL would complain on the console.
+/// False for points on a line, or fewer than three positions: PCL would complain on the console.
 bool spans_a_plane(const Cloud& points, const pcl::Indices& indices) {
   if (indices.size() < 3) return false;
   Eigen::Matrix3d covariance;

@@ -67,7 +67,7 @@ std::vector<FusionTile> plan_tiles(const std::vector<std::vector<ColorCell>>& vi
   cells.reserve(keys.size());
   for (const std::uint64_t key : keys) cells.push_back(unpack_cell(key));
 
-  // Several tiles even where one would do: they are worked on side by side.
+  // Several tiles even if one would suffice, because they are processed in parallel.
   const std::size_t share = std::max(kFewestCells, cells.size() / kTiles + 1);
   const Eigen::Vector3i most = Eigen::Vector3i::Constant(1 << 21);
   const Eigen::AlignedBox3i space(-most, most);

@@ -22,7 +22,7 @@ double axis_shift(const std::vector<double>& values);
 /// Stands for x, y or z: 0, 1, 2; none for other columns.
 std::optional<int> axis_of_column(Meaning meaning);
 
-/// The coordinate as it was before `shift` was taken off. The float stands for the shortest decimal number
+/// The original coordinate, before `shift` was subtracted. The float stands for the shortest decimal number
 /// that reads as it, so that 0.56F and 701362 give 701362.56.
 double with_shift(float value, double shift);
 

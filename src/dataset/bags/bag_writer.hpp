@@ -20,7 +20,7 @@ class BagWriter {
   virtual void write(const std::string& topic, const CameraInfoMessage& message) = 0;
   virtual void write(const std::string& topic, const std::vector<TransformMessage>& transforms,
                      std::int64_t stamp_ns) = 0;
-  /// A message of one of these types as it came; `type`: "sensor_msgs/msg/Image".
+  /// Writes a message of one of these types unchanged; `type`: "sensor_msgs/msg/Image".
   virtual void write_bytes(const std::string& topic, const std::string& type, std::int64_t log_ns,
                            const Bytes& cdr) = 0;
   /// Stores the camera file beside the messages, for what these cannot express.

@@ -20,8 +20,8 @@ bool is_compressed_depth(const std::string& format);
 /// sensor_msgs/Image: rgb8 bgr8 rgba8 bgra8 mono8 8UC1 8UC3 8UC4 rgb16 bgr16 yuv422 uyvy yuyv yuv422_yuy2;
 /// 16UC1 mono16 32FC1. What is wrong otherwise, with the remedy.
 MessageImage image_of(const ImageMessage& message);
-/// sensor_msgs/CompressedImage: JPEG, PNG and what else images are stored in; compressedDepth as PNG or RVL,
-/// of 32FC1 too.
+/// sensor_msgs/CompressedImage: JPEG, PNG and other image formats; compressedDepth as PNG or RVL, of 32FC1
+/// too.
 MessageImage image_of(const CompressedImageMessage& message);
 
 }  // namespace plumbline::dataset

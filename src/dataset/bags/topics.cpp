@@ -197,7 +197,7 @@ core::Result<ChosenTopic> choose_color(const BagSurvey& survey, const std::vecto
                                        colors.front().topic->topic.name));
 }
 
-/// The CameraInfo of an image: beside it, or the one whose name shares most with it.
+/// The CameraInfo of an image: the one beside it, or the one with the most similar name.
 core::Result<ChosenTopic> choose_info(const BagSurvey& survey, const std::string& image,
                                       const std::string& named, const char* option) {
   std::vector<const SurveyedTopic*> infos;

@@ -31,7 +31,7 @@ core::Result<void> make_room(const fs::path& out, bool file, bool replace) {
       fmt::format("{}: exists already and is not a copy of a recording; name another place", out.string()));
 }
 
-/// A folder is written beside its place, which it takes in the end.
+/// Moves a folder, which was written beside its destination, to it.
 core::Result<void> put_in_place(const fs::path& written, const fs::path& out) {
   std::error_code problem;
   fs::remove_all(out, problem);

@@ -21,7 +21,7 @@ constexpr std::chrono::milliseconds kLookForListeners(20);     // for listeners,
 constexpr std::chrono::milliseconds kAfterFirstListener(500);  // its other subscriptions may come
 constexpr std::chrono::milliseconds kLastWords(2000);
 
-/// A bag whose messages go out as they are written. The first frame is only looked at: listeners have to know
+/// A bag whose messages are sent as they are written. The first frame is only read: subscribers have to know
 /// the topics before it is sent.
 class SinkWriter final : public BagWriter {
  public:

@@ -10,7 +10,7 @@
 namespace plumbline::dataset {
 namespace {
 
-/// "1305031102.175304000": whole nanoseconds, so that the copy's stamps are those of the original.
+/// "1305031102.175304000": whole nanoseconds, so that the copy has the stamps of the original.
 std::string stamp_text(std::int64_t nanoseconds) {
   constexpr std::int64_t kSecond = 1'000'000'000;
   const bool negative = nanoseconds < 0;

@@ -30,7 +30,7 @@ struct PolycamFrame {
   geometry::Rigid3 world_from_camera;
 };
 
-/// None when a number is missing, or the transform is none.
+/// None if a number is missing, or the transform is not rigid.
 std::optional<PolycamFrame> read_polycam_camera(const fs::path& file) {
   const nlohmann::json camera_file = read_json_file(file);
   bool whole = true;

@@ -82,7 +82,7 @@ core::Result<sensor::CameraReading> record3d_camera(const fs::path& file, const 
   return reading;
 }
 
-/// Each frame's own pinhole, where the lens focused and metadata.json says how.
+/// Adds each frame's own pinhole, if the lens focused and metadata.json has the values.
 void add_record3d_cameras(const json& metadata, const sensor::Pinhole& nominal, Layout& layout) {
   std::vector<sensor::Pinhole> cameras;
   for (const PairInfo& pair : layout.pairs) {

@@ -43,7 +43,7 @@ core::Result<void> no_decimal_comma(const fs::path& list) {
   return {};
 }
 
-/// Sorts by stamp and drops files whose stamp came before; says so.
+/// Sorts by stamp and drops files with a repeated stamp, with a warning.
 void sort_and_unique(const std::string& list, std::vector<StampedFile>& files, core::Log& log) {
   if (!std::is_sorted(files.begin(), files.end(), kByStamp)) {
     log.warning(fmt::format("{}: the stamps are not in order; sorted", list));

@@ -53,7 +53,7 @@ class RayCounter {
   [[nodiscard]] bool free(std::size_t cell) const { return counts_[cell] >= kGridFewestRays; }
 
  private:
-  /// Every cell between two places (Amanatides and Woo 1987).
+  /// Visits every cell between two positions (Amanatides and Woo 1987).
   void cross(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
     const Eigen::Vector2d a = (from.head<2>() - grid_.origin) / grid_.resolution_m;
     const Eigen::Vector2d way = (to.head<2>() - from.head<2>()) / grid_.resolution_m;

@@ -10,7 +10,7 @@
 
 namespace plumbline::exports {
 
-/// A 3D point and where pictures show it.
+/// A 3D point and its positions in pictures.
 struct ModelPoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   std::array<std::uint8_t, 3> color{128, 128, 128};  ///< red, green, blue

@@ -16,9 +16,9 @@ using core::KeyframeId;
 using geometry::Matrix6d;
 using geometry::Rigid3;
 
-/// One keyframe after another, by what the tracker has seen in between. Weaker than landmarks and surfaces:
-/// it holds keyframes that have neither, those taken while turning, and the length of a corridor that nothing
-/// else measures.
+/// Information between consecutive keyframes, from tracking. Weaker than landmarks and surfaces: it holds
+/// keyframes that have neither, those taken while turning, and the length of a corridor that nothing else
+/// measures.
 Matrix6d chain_information() { return geometry::information_of(0.01, 0.007); }
 
 /// Builds the bundle of a whole map. Several cameras become one: pixels are carried to the first robot's
@@ -99,7 +99,7 @@ class GlobalBuilder {
   [[nodiscard]] double motion_factor(KeyframeId id) const {
     return motion_factor_[static_cast<std::size_t>(index_of(id))];
   }
-  /// A pixel as the problem's camera would have it.
+  /// A pixel converted to the problem's camera.
   [[nodiscard]] Eigen::Vector2d pixel(KeyframeId id, const Eigen::Vector2d& seen) const {
     const sensor::Pinhole& from = cameras_.at(id.robot);
     const sensor::Pinhole& to = bundle_.problem.camera;

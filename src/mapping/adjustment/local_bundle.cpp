@@ -90,8 +90,7 @@ class Builder {
     for (core::LineId id : lines) add_line(id);
   }
 
-  /// A distorted image's depth is distorted, too: its surfaces say as little about where it was as its
-  /// corners.
+  /// The depth of a distorted image is distorted, too, so its surfaces are weakened like its corners.
   void add_edges() {
     for (KeyframeId id : std::vector<KeyframeId>(bundle_.keyframes)) {
       const maps::Keyframe& keyframe = map_.keyframe(id);
@@ -267,7 +266,7 @@ LocalBundle take_local_bundle(const maps::Map& map, KeyframeId keyframe, const s
   return bundle;
 }
 
-/// Poses of the bundle's keyframes, and of those made after the take.
+/// Poses of the bundle's keyframes, and of those made after it was taken.
 static KeyframePoses poses_after(const LocalBundle& bundle, const MapCorrection& correction,
                                  const maps::Map& map) {
   KeyframePoses poses;

@@ -99,10 +99,10 @@ Discrepancy discrepancy(const maps::Map& map, const std::vector<KeyframeId>& ids
   return d;
 }
 
-/// Errors of neighbours are alike, so that drift grows with the way rather than with its root: with all alike
-/// the variance after n steps is n times what independent ones would have. By how much the covariance of the
-/// map's own edges must grow for the measured edges to be explained: the median over these, so that wrong
-/// ones do not decide it.
+/// Factor by which the covariance of the map's own edges must grow to explain the measured edges. Errors of
+/// neighbours are correlated, so drift grows with the path rather than with its root: if all are equal the
+/// variance after n steps is n times that of independent ones. The median over the measured edges is used, so
+/// that wrong ones do not decide it.
 double drift_factor(const std::vector<Discrepancy>& discrepancies) {
   std::vector<double> factors;
   for (const Discrepancy& d : discrepancies) {
@@ -182,7 +182,7 @@ class GraphBuilder {
   optimize::PoseGraph graph_;
 };
 
-/// Mean of the places where a landmark's keyframes would take it.
+/// Mean of the positions to which a landmark's keyframes would move it.
 Eigen::Vector3d carried(const Eigen::Vector3d& p, const std::vector<maps::Observation>& seen,
                         const std::map<KeyframeId, Rigid3>& new_from_old) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();

@@ -221,7 +221,7 @@ class MapRecalibration {
     for (const auto& [id, pose] : solve_trusted_graph(map_, relative)) map_.set_pose(id, pose);
   }
 
-  /// To the mean of where its keyframes see it now.
+  /// Moves a landmark to the mean of the positions at which its keyframes see it now.
   template <typename Place>
   void move_place(const std::vector<maps::Observation>& seen, const Eigen::Vector3d& normal,
                   Place& place) const {

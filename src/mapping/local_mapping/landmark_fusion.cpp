@@ -31,7 +31,7 @@ std::vector<PointId> unseen_points(const maps::Map& map, const std::vector<Keyfr
   return result;
 }
 
-/// Does the landmark lie where the feature saw something?
+/// True if the landmark agrees with the feature's measurement.
 bool fits(const maps::MapPoint& point, const features::PointFeature& f,
           const geometry::Rigid3& camera_from_world, const sensor::Pinhole& camera, double scale_factor) {
   const Eigen::Vector3d p = camera_from_world * point.position;

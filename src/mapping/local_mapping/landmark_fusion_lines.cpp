@@ -50,7 +50,7 @@ bool fits(const maps::MapLine& line, const features::LineFeature& f,
   return true;
 }
 
-/// Does the landmark lie where each of the other's keyframes saw it? Two edges may meet in one image by
+/// True if the landmark agrees with all keyframes of the other one: two edges may coincide in one image by
 /// chance.
 bool fits_all(const maps::Map& map, const maps::MapLine& line, const maps::MapLine& other,
               const std::map<std::int32_t, sensor::Pinhole>& cameras) {

@@ -18,7 +18,7 @@ constexpr double kEpipolarGate_px = 2.0;    // at octave 0
 constexpr double kAlternative_px = 3.0;     // corners of several octaves at one place are one corner
 constexpr double kMaxScaleChange = 1.8;     // of a corner's size in space, between its two images
 
-/// One keyframe with what the search needs of it.
+/// Data of one keyframe for the search.
 struct FreeCorners {
   const features::FrameFeatures& features;
   const Rigid3& camera_from_world;

@@ -62,7 +62,7 @@ std::optional<Rigid3> InterRobotLoops::locate(places::Database& database, const 
   return seen->evidence.query_from_match * others_->map.camera_from_world(seen->match);
 }
 
-/// The late query relative to the early one; none where they say nothing new of each other.
+/// The late query relative to the early one; none if that is not new information.
 std::optional<Loop> InterRobotLoops::by_way_of(const maps::Map& map, const Loop& early, const Loop& late,
                                                double& chi2) const {
   const maps::Map& theirs = others_->map;

@@ -20,7 +20,7 @@ constexpr int kRelated = 5;             // shared landmarks: the same surroundin
 constexpr std::size_t kAroundLoop = 8;  // keyframes on each side whose landmarks are compared
 constexpr int kDisputing = 5;           // keyframes whose loops agree against the path
 
-/// The query's pose in the world, as the loop says.
+/// The query's pose in the world according to the loop.
 Rigid3 world_from_query(const maps::Map& map, const Loop& loop) {
   return map.camera_from_world(loop.match).inverse() * loop.evidence.query_from_match.inverse();
 }
@@ -74,8 +74,8 @@ std::vector<Loop> LoopCloser::verify(const maps::Map& map, KeyframeId keyframe,
   return verified;
 }
 
-/// One loop that drift does not explain is another place that looks the same. Many that agree with one
-/// another and with nothing else are evidence against the path.
+/// A single loop that drift does not explain is another place that looks the same. Many that agree with one
+/// another, without an alternative, are evidence against the path.
 void LoopCloser::note_dispute(const maps::Map& map, KeyframeId keyframe, const std::vector<Loop>& far) {
   LoopOptions options = options_;
   options.agreeing = kDisputing;
@@ -113,7 +113,8 @@ void LoopCloser::measure_correction(const maps::Map& map, LoopTrial& trial) cons
   trial.correction_rad = geometry::rotation_angle(correction.rotation);
 }
 
-/// Drift grows with the way. A correction far beyond it means another place that looks the same.
+/// Tests the correction against drift, which grows with the path: a much larger one means another place that
+/// looks the same.
 std::string LoopCloser::judge(const maps::Map& map, LoopTrial& trial) const {
   constexpr double kAlways_m = 0.1;
   constexpr double kAlways_rad = 0.05;

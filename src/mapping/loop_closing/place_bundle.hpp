@@ -11,8 +11,8 @@
 namespace plumbline::mapping {
 
 /// The query's pose in the match's world, adjusted together with the landmarks of the match's map that its
-/// features are; keyframes `around` the match hold these where they see them, and stay. What it began with
-/// when nothing comes of it.
+/// features see; keyframes `around` the match constrain these and are fixed. The initial pose if the
+/// adjustment fails.
 geometry::Rigid3 adjust_pair(const PlaceView& query, const PlaceView& match,
                              const std::vector<core::KeyframeId>& around,
                              const std::vector<tracking::PointMatch>& points,

@@ -40,8 +40,8 @@ struct RansacPose {
   std::vector<int> lines;
 };
 
-/// The pose that most pairs agree with; none when fewer than `min_inliers` do. Samples are three points, or
-/// two lines in space where points are few. Same seed, same result.
+/// The pose with which most pairs agree; none if fewer than `min_inliers` do. Samples are three points, or
+/// two lines in space if there are few points. Same seed, same result.
 std::optional<RansacPose> ransac_pose(const PosePairs& pairs, const sensor::Pinhole& camera, int max_rounds,
                                       int min_inliers, std::uint64_t seed);
 

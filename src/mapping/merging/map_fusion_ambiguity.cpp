@@ -140,7 +140,8 @@ std::string objection(const Ambiguity& ambiguity, int agreeing, const MapFusionO
         "seen through",
         agreeing, surfaces.there, surfaces.through);
   }
-  // One keyframe may be mistaken; two that agree are an alternative. Few have no such alternatives at all.
+  // One keyframe may be mistaken; two that agree are an alternative. For few keyframes no alternative is
+  // allowed.
   if (ambiguity.alternative >= (few ? 1 : 2) && ambiguity.alternative >= options.alternative * agreeing) {
     return fmt::format(
         "two answers exclude each other: {} keyframes say one thing, {} another; places look alike here",

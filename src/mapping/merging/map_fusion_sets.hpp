@@ -34,7 +34,7 @@ struct PairSets {
 PairSets accepted_pairs(const PartPair& maps, const std::vector<VerifiedPair>& pairs);
 PairSets pair_sets(const PartPair& maps, const std::vector<VerifiedPair>& pairs);
 
-/// a's world from b's, as one pair says.
+/// Transform from b's world to a's according to one pair.
 geometry::Rigid3 worlds(const maps::Map& a, const maps::Map& b, const PlacePair& pair);
 
 /// Robust mean of what the pairs say.

@@ -57,7 +57,7 @@ class MapOverlay {
   static Side side(const MapPart& part);
   static Landmark landmark(const maps::Map& map, core::PointId id);
   bool match(const Side& side, const Landmark& landmark, const Eigen::Vector3d& at, OverlayFit& sum) const;
-  /// `matched`: where (in the fixed map's world) landmarks match, added to it; may be null.
+  /// `matched`: receives the positions (in the fixed map's world) at which landmarks match; may be null.
   void overlay(const Side& moved, const Side& fixed, const geometry::Rigid3& fixed_from_moved,
                OverlayFit& sum, std::vector<Eigen::Vector3d>* matched = nullptr) const;
   static void vote(const Side& moved, const Side& fixed, const geometry::Rigid3& fixed_from_moved,

@@ -30,7 +30,7 @@ std::pair<std::size_t, std::size_t> robots_of(const OverlapFinder::Candidate& ca
           std::max(candidate.query_part, candidate.match_part)};
 }
 
-/// Covariance of a position and rotation in a world, carried `arm` away from where it holds.
+/// Covariance of a position and rotation in a world, moved by `arm` from its point of reference.
 Matrix6d carried(const Matrix6d& covariance, const Eigen::Vector3d& arm) {
   Matrix6d carry = Matrix6d::Identity();
   carry.topRightCorner<3, 3>() = -geometry::skew(arm);

@@ -103,7 +103,7 @@ class Aligner {
   }
 
  private:
-  /// ICP from where the surfaces lie now; false: refused.
+  /// ICP from the present pose; false: refused.
   bool settle() {
     choose_samples();
     return align(false) && align(true);
@@ -182,8 +182,8 @@ class Aligner {
       result_.refused = fmt::format("the surfaces hold {} directions of 6", result_.held);
     }
   }
-  /// In the directions that are held: what the matches say, scaled by how well they fit, no better than the
-  /// floor. Nothing in the others.
+  /// Sets the information: in held directions from the matches, scaled by their fit and bounded by the floor;
+  /// zero in the others.
   void set_information() {
     const double fit = options_.correlation / std::max(1.0, step_.rms * step_.rms);
     Matrix6d scaled = Matrix6d::Zero();

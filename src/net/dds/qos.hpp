@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// All qualities of service; qos.cpp gives the reason for each.
+// All quality-of-service settings; qos.cpp gives the reason for each.
 #include <dds/dds.h>
 
 #include <memory>

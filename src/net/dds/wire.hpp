@@ -17,7 +17,7 @@ void put_text(const std::string& from, char (&to)[kSize]) {
   std::memset(to + size, 0, kSize - size);
 }
 
-/// Texts come from strangers and go to terminals and logs: characters that cannot be printed become '?'.
+/// Texts come from other machines and go to terminals and logs: unprintable characters become '?'.
 template <std::size_t kSize>
 std::string get_text(const char (&from)[kSize]) {
   std::string text(from, strnlen(from, kSize));

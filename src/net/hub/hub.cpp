@@ -129,7 +129,7 @@ core::Result<std::unique_ptr<HubBus>> open_logged_bus(const NetworkOptions& opti
   });
 }
 
-/// Fuses the maps that came into `folder`; the summary's `reason` says why the result may not be trusted.
+/// Fuses the received maps in `folder`; the summary's `reason` says why the result may not be trusted.
 core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, const fs::path& folder,
                                                   const std::vector<RobotTraffic>& traffic,
                                                   const HubMeetings& meetings, const core::Executor& executor,

@@ -24,8 +24,8 @@ class OtherRobots {
   /// Reads from any status of the hub the pose of its addressee in the shared frame.
   void apply(const HubStatus& hub);
   void receive(const Chunk& chunk);
-  /// Puts the maps into the inbox when they have changed, every few seconds at most, and so seldom that it
-  /// takes a tenth of the time.
+  /// Puts the maps into the inbox if they have changed, every few seconds at most, and so seldom that it
+  /// takes no more than a tenth of the time.
   void publish();
 
  private:
@@ -47,7 +47,7 @@ class OtherRobots {
   std::int32_t numbers_ = 0;  ///< given so far: a map that starts again gets a new one
   bool changed_ = false;
   Clock::time_point next_;  ///< earliest time to publish
-  /// Kept while the tracker may use them: their destruction takes a while, and must not be the tracker's.
+  /// Kept while the tracker may use them, so that the tracker does not spend time on destroying them.
   std::vector<std::shared_ptr<const mapping::OtherMaps>> published_;
 };
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Sends what the hub lacks from a robot's store, beside the run: the run never waits for it, and nothing it
-// does enters the map.
+// Sends the data of a robot's store that the hub lacks, beside the run: the run never waits for it, and it
+// never changes the map.
 #include <filesystem>
 #include <memory>
 #include <mutex>

@@ -18,7 +18,7 @@ using core::ConfigNode;
 using core::ConfigProblems;
 using Kind = ConfigNode::Kind;
 
-/// A stage's own checks know the stage's place only; a problem of one of its keys is found where that stands.
+/// A stage's own checks only know the stage's position; a problem of one of its keys is reported at the key.
 void check_stage(StageSpec& spec, const CheckContext& context, ConfigProblems& problems) {
   ConfigProblems found;
   spec.node.stage->check(context, spec.mark, spec.path, found);

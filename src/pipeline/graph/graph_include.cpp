@@ -50,7 +50,7 @@ void put(ConfigNode& map, const std::string& key, ConfigNode value, const Config
   map.key_marks.push_back(mark);
 }
 
-/// The list of words under `key`: one alone may stand without brackets.
+/// The list of words under `key`; a single word may be written without brackets.
 std::vector<const ConfigNode*> words(const ConfigNode& root, const std::string& key, const char* example,
                                      ConfigProblems& problems) {
   const ConfigNode* node = root.find(key);
@@ -193,7 +193,8 @@ class Includer {
     stages->key_marks.erase(stages->key_marks.begin() + static_cast<std::ptrdiff_t>(place));
   }
 
-  /// A stage without type changes an included one; when there is none of that name, that is the problem.
+  /// A stage without type changes an included one; if there is none of that name, that is the only problem
+  /// reported.
   void drop_unknown_changes(ConfigNode& own, ConfigNode& base) {
     ConfigNode* stages = find(own, "stages");
     if (stages == nullptr || stages->kind != Kind::kMap) return;

@@ -11,7 +11,7 @@
 
 namespace plumbline::pipeline {
 
-/// A stage or tap as the file gives it, on its way to a Node.
+/// A stage or tap of the file, from which a Node is made.
 struct StageSpec {
   Node node;
   core::ConfigMark mark;

@@ -14,7 +14,7 @@ using core::ConfigNode;
 using core::ConfigProblems;
 using Kind = ConfigNode::Kind;
 
-/// The port that "stage" or "stage.port" means; none: reported.
+/// The port named by "stage" or "stage.port"; none: reported.
 std::optional<OutputRef> find_port(const StageSpecs& specs, const ConfigNode& port, const std::string& path,
                                    ConfigProblems& problems) {
   const auto refuse = [&](std::string what) {

@@ -22,7 +22,7 @@ class WaitingClouds {
   static core::Result<WaitingClouds> create(const RunContext& context);
   /// Notes a cloud, and stores it unless a stage does. Errors (kOutput): disk full.
   core::Result<void> append(const KeyframeCloud& cloud);
-  /// All that came, when all have come. Errors (kInput): they cannot be read back.
+  /// All clouds, once every one was appended. Errors (kInput): they cannot be read back.
   core::Result<const maps::StoreReader*> open();
   [[nodiscard]] const maps::Arrivals& arrivals() const { return arrivals_; }
   /// Removes the temporary store.

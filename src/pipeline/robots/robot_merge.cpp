@@ -86,7 +86,7 @@ Json laid(const mapping::OverlayFit& fit) {
           {"seen_through", fit.contradicted}};
 }
 
-/// Standard deviations, the whole matrix, and where the maps lie.
+/// Adds standard deviations, the whole covariance, and the relative pose of the maps.
 void add_alignment(const mapping::Alignment& alignment, Json& entry) {
   Json sigma = Json::array();
   Json covariance = Json::array();

@@ -77,7 +77,7 @@ std::string input_text(const RobotRecordings& source) {
   return text;
 }
 
-/// The same request for any order of its recordings: by name, and by folder where names are alike.
+/// The same request for any order of its recordings: sorted by name, and by folder for equal names.
 MapRequest in_order(MapRequest request) {
   if (request.others.empty()) return request;
   struct Input {

@@ -25,7 +25,7 @@ class Pace {
   void wait_for(std::size_t frame, const core::StopToken& stop);
   /// True if the frame may be handed out. The clock starts with the first query.
   bool is_due(std::size_t frame);
-  /// Frames are reported when all is done with them.
+  /// Reports a frame as completely processed.
   void done(std::size_t frame);
   /// Delay of the latest frame behind its due time when it was done, seconds; 0 without a pace.
   [[nodiscard]] double behind_s() const { return behind_s_; }

@@ -27,7 +27,7 @@ double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-/// One frame on its way: what each stage has put out so far.
+/// One frame under way, with the outputs of each stage so far.
 struct Tick {
   std::size_t frame = 0;
   std::vector<std::vector<Value>> outputs;  ///< [node][port]
@@ -66,7 +66,7 @@ core::Result<void> guarded(const std::string& stage, const Call& call) {
   }
 }
 
-/// The allocator's free pages, where it keeps them.
+/// Returns the allocator's free pages to the system, if it keeps them.
 void give_back_memory() {
 #ifdef __GLIBC__
   malloc_trim(0);

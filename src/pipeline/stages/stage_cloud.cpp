@@ -90,7 +90,7 @@ class CloudStage : public Stage {
     const auto track = io.input<TrackedFrame>("track");
     const std::int32_t robot = recordings_->robot_of(io.frame());
     const std::size_t number = recordings_->frame_of(io.frame());
-    // The last frame shows what no other does when the camera was on its way somewhere.
+    // The last frame may show surface that no other frame does, if the camera was still moving.
     const bool gives_cloud =
         track->keyframe.valid() ||
         (intermediate_every_ > 0 && (number % static_cast<std::size_t>(intermediate_every_) == 0 ||

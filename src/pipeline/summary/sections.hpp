@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Sections of summary.json. Each stage fills in those that it knows (Stage::report); what several stages have
-// in common is here.
+// Sections of summary.json. Each stage fills in its own (Stage::report); parts that several stages share are
+// here.
 #include <cstddef>
 #include <nlohmann/json.hpp>
 #include <string>

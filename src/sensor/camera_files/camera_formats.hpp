@@ -11,7 +11,7 @@
 
 namespace plumbline::sensor {
 
-/// A camera file as text, as a tree where it is YAML or JSON, and as numbers where it holds nothing else.
+/// A camera file as text, as a tree if it is YAML or JSON, and as numbers if it holds nothing else.
 struct CameraText {
   std::string file;  ///< for messages
   std::string text;
@@ -25,7 +25,7 @@ struct CameraFormat {
   const char* program;
   bool structured;  ///< recognised by its keys, so that it is found among other files
   bool (*recognises)(const CameraText& text);
-  /// The size is 0 and has_size, has_depth_scale false where the file does not say.
+  /// Reads the file. If it does not have them, the size is 0 and has_size, or has_depth_scale, is false.
   core::Result<CameraReading> (*read)(const CameraText& text);
 };
 

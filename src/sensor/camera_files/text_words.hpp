@@ -13,8 +13,8 @@ struct CameraLine {
   std::vector<std::string> words;
 };
 
-/// Words are what stands between the `separators`; comments ('#'), blank lines and a byte order mark are
-/// passed over.
+/// Lines of words, which are separated by `separators`; comments ('#'), blank lines and a byte order mark are
+/// skipped.
 std::vector<CameraLine> camera_text_lines(const std::string& text, std::string_view separators);
 
 }  // namespace plumbline::sensor

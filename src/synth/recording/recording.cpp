@@ -176,7 +176,7 @@ Result<std::vector<std::unique_ptr<SynthSource>>> open_all(const std::shared_ptr
   return sources;
 }
 
-/// The recording of each robot; gives what scene.json says of them.
+/// Writes the recording of each robot; returns their entries in scene.json.
 Result<nlohmann::json> write_robots(const std::vector<std::unique_ptr<SynthSource>>& sources,
                                     const Scene& scene, const fs::path& output,
                                     const core::Executor& executor, const core::StopToken& stop,

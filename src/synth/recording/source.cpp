@@ -47,7 +47,7 @@ namespace {
 
 constexpr double kFirstStamp = 100.0;  // seconds; stamps of 0 look like missing ones
 
-/// Whole microseconds: what six decimals in a file can say.
+/// Rounds to whole microseconds, the resolution of six decimals in a file.
 double whole_us(double t) { return std::round(t * 1e6) / 1e6; }
 
 std::vector<Stamps> make_stamps(const SynthOptions& o, const std::vector<Event>& events, std::size_t frames,
@@ -191,7 +191,7 @@ cv::Mat2f SynthSource::Impl::flow(const View& view, const Stamps& at, double ext
   return out;
 }
 
-/// A few rows at a time, each from where the camera was when they were read out.
+/// Renders a few rows at a time, each from the camera's pose when they were read out.
 cv::Mat3b SynthSource::Impl::rolling(const Stamps& at, const Exposure& exposure) const {
   constexpr int kRows = 8;
   cv::Mat3b image(camera.color.height, camera.color.width);

@@ -31,7 +31,7 @@ const std::array<Vector3d, kDome>& dome() {
   return kDirections;
 }
 
-/// Negative when the place is inside a solid.
+/// Ambient light at a point; negative inside a solid.
 double ambient_at(const World& world, const Vector3d& p, const Face& face) {
   double open = 0.0;
   int insides = 0;

@@ -215,7 +215,7 @@ core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const
         fmt::format("walkers: scene '{}' has {}, not {}", scene.name, scene.walkers.size(), options.walkers));
   }
 
-  // The cheap things that can go wrong come before the second or two of drawing.
+  // Cheap checks come before the second or two of drawing.
   if (auto free = check_paths(scene, options); !free) return tl::unexpected<core::Error>(free.error());
   auto world = std::make_shared<World>(scene, options);
   world->build_textures(executor);

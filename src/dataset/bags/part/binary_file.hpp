@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A file that is read at places, by several threads at once.
+// A file with random access, by several threads at once.
 #include <cstdint>
 #include <filesystem>
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// zstd, LZ4 (frames) and bzip2 in pieces, so that the beginning of something large can be looked at without
-// the rest, and nothing is allocated because a header says so.
+// zstd, LZ4 (frames) and bzip2 in pieces, so that the beginning of large data can be read without the rest,
+// and no header determines how much memory is allocated.
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -25,7 +25,7 @@ class Inflater {
 /// Inflates `size` bytes, which must outlive it; kNone copies.
 std::unique_ptr<Inflater> make_inflater(Compression compression, const std::uint8_t* data, std::size_t size);
 
-/// At most `most` bytes; empty and false where the data are damaged or hold more.
+/// Inflates at most `most` bytes; empty and false if the data are damaged or longer.
 bool inflate_all(Compression compression, const std::uint8_t* data, std::size_t size, std::uint64_t most,
                  Bytes& to);
 

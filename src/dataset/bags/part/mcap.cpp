@@ -154,7 +154,7 @@ bool McapFile::scan_records(ChunkCursor& records, const Chunk& chunk, std::uint6
   return true;
 }
 
-/// `get` gives the message's bytes from its head on.
+/// `get` reads the message's bytes from its head on.
 template <typename Get>
 bool McapFile::scan_message(const Get& get, MessagePlace place, const Visit& visit) {
   std::array<std::uint8_t, kMessageHead> fixed{};

@@ -16,7 +16,7 @@
 namespace plumbline::dataset {
 namespace {
 
-/// A bag in a file that goes with it.
+/// A bag in a temporary file that is removed with it.
 class UnpackedBag final : public BagFile {
  public:
   UnpackedBag(TemporaryFile file, std::unique_ptr<BagFile> bag)

@@ -71,7 +71,7 @@ struct BagRecord {
   std::uint32_t data_size = 0;
 };
 
-/// Up to a record's data; none when it is damaged or ends. `get` gives the next bytes.
+/// Reads up to a record's data; none if it is damaged or at the end. `get` reads the next bytes.
 template <typename Get>
 std::optional<BagRecord> next_record(const Get& get) {
   std::array<std::uint8_t, sizeof(std::uint32_t)> word{};
@@ -176,7 +176,7 @@ core::Result<void> Ros1Bag::scan(const Visit& visit) {
   return {};
 }
 
-/// A record that is in a chunk, or would be; false when it is damaged.
+/// Visits a record that is in a chunk, or would be; false if it is damaged.
 template <typename Get>
 bool Ros1Bag::scan_inner(const BagRecord& record, const Get& get_data, MessagePlace place,
                          const Visit& visit) {
