@@ -76,9 +76,9 @@ walls ([dense_cloud.md](dense_cloud.md)). Grid, cloud, LAS, octree, COLMAP model
 glTF's axes, and `--datum` and `--epsg` move their outputs. Each file that can hold text names its frame. For an
 interrupted run the floor is searched during the export.
 
-`--datum LAT,LON,HEADING` gives the position of the map's origin on WGS 84 and the direction of its x axis (degrees clockwise
-from true north); the map is moved into the UTM zone there, turned by the zone's convergence and scaled by its local
-scale. `--epsg N --origin E,N,H` moves it into any projected system in metres; a fourth number turns the map clockwise,
+`--datum LAT,LON,HEADING` gives the position of the map's origin on WGS 84 and the direction of its x axis (degrees
+clockwise from true north); the map is moved into the UTM zone there, turned by the zone's convergence and scaled by its
+local scale. `--epsg N --origin E,N,H` moves it into any projected system in metres; a fourth number turns the map clockwise,
 in degrees. The transform is in the file's own header and, as a whole matrix, in `FILE.georeference.json`.
 
 Files are written under another name first and renamed when they are whole: a full disk leaves nothing that looks
