@@ -92,6 +92,7 @@ void move_component(Map& map, KeyframeId root, const geometry::Rigid3& new_from_
     point.normal = new_from_old_world.rotation * point.normal;
     point.view_direction = new_from_old_world.rotation * point.view_direction;
   }
+
   for (const core::LineId id : map.line_ids()) {
     if (!is_inside(std::as_const(map).line(id))) continue;
     MapLine& line = map.line(id);
@@ -122,6 +123,7 @@ void split_component(Map& map, KeyframeId first) {
       const auto& seen = std::as_const(map).point(point).observations;
       if (std::any_of(seen.begin(), seen.end(), is_other)) map.unobserve(point, id);
     }
+
     for (const core::LineId line : map.lines_seen_by({id})) {
       const auto& seen = std::as_const(map).line(line).observations;
       if (std::any_of(seen.begin(), seen.end(), is_other)) map.unobserve(line, id);
@@ -132,6 +134,7 @@ void split_component(Map& map, KeyframeId first) {
   std::vector<LoopEdge> loops = map.loops();
   loops.erase(std::remove_if(loops.begin(), loops.end(), is_between), loops.end());
   map.set_loops(std::move(loops));
+
   const std::map<std::uint64_t, SurfaceEdge> edges = map.edges();
   for (auto [number, edge] : edges) {
     if (!is_between(edge) || all.count(edge.a) == 0) continue;

@@ -21,14 +21,17 @@ core::Result<void> write_lines_ply(const std::filesystem::path& file,
   if (!colors.empty() && colors.size() != segments.size()) {
     return core::failure(core::ErrorKind::kInternal, file.string() + ": as many colours as lines are needed");
   }
+
   constexpr std::array<std::uint8_t, 3> kBlue{20, 60, 140};
   std::array<std::vector<float>, 3> position;
   std::array<std::vector<std::uint8_t>, 3> color;
   cloud::PlyData ply;
   ply.comments = {"plumbline, line landmarks, metres"};
+
   for (std::size_t i = 0; i < segments.size(); ++i) {
     const auto& [start, end] = segments[i];
     if (!start.allFinite() || !end.allFinite()) continue;
+
     const auto& rgb = colors.empty() ? kBlue : colors[i];
     const auto first = static_cast<std::uint32_t>(position[0].size());
     for (const Eigen::Vector3d& point : {start, end}) {
@@ -37,9 +40,11 @@ core::Result<void> write_lines_ply(const std::filesystem::path& file,
         color[axis].push_back(rgb[axis]);
       }
     }
+
     ply.edges.push_back({first, first + 1});
     ply.edge_colors.push_back(rgb);
   }
+
   const std::array<const char*, 3> axes{"x", "y", "z"};
   const std::array<const char*, 3> channels{"red", "green", "blue"};
   for (std::size_t axis = 0; axis < 3; ++axis) ply.add(axes[axis], std::move(position[axis]));

@@ -102,6 +102,7 @@ core::Result<AzureCamera> camera_in_mode(const json& camera, const AzureMode& mo
   if (model != "CALIBRATION_LensDistortionModelBrownConrady")
     return core::input_error(
         fmt::format("its calibration has the lens model '{}', which is not known", model));
+
   const auto n = finite_numbers(value_at(camera, {"Intrinsics", "ModelParameters"}), 14);
   const auto r = finite_numbers(value_at(camera, {"Rt", "Rotation"}), 9);
   const auto t = finite_numbers(value_at(camera, {"Rt", "Translation"}), 3);
@@ -110,6 +111,7 @@ core::Result<AzureCamera> camera_in_mode(const json& camera, const AzureMode& mo
         "its calibration is damaged: 14 parameters, 9 of a rotation and 3 of a translation "
         "are needed, and a centre of distortion of 0");
   }
+
   AzureCamera result;
   constexpr double kCentreOfFirstPixel = 0.5;
   result.pinhole = {mode.width,
@@ -118,12 +120,14 @@ core::Result<AzureCamera> camera_in_mode(const json& camera, const AzureMode& mo
                     (*n)[3] * mode.sensor_height,
                     (*n)[0] * mode.sensor_width - mode.crop_x - kCentreOfFirstPixel,
                     (*n)[1] * mode.sensor_height - mode.crop_y - kCentreOfFirstPixel};
+
   const std::vector<double>& k = *n;
   result.lens.k = {k[4], k[5], k[13], k[12], k[6], k[7], k[8], k[9]};
   const Eigen::Matrix3d rotation = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r->data());
   const double bent = (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!(bent < 1e-3) || rotation.determinant() < 0.0)
     return core::input_error("its calibration is damaged: Rt is not a rotation");
+
   result.from_rig =
       geometry::Rigid3(Eigen::Quaterniond(rotation), Eigen::Vector3d((*t)[0], (*t)[1], (*t)[2]));
   return result;
@@ -187,14 +191,17 @@ core::Result<sensor::Camera> azure_kinect_camera(const std::string& calibration,
     return core::input_error(
         fmt::format("its depth mode '{}' is not known (known: {})", depth_mode, mode_names(kDepthModes)));
   }
+
   if (color == nullptr) {
     return core::input_error(
         fmt::format("colour images {} pixels high are of no mode that is known (known: {})", color_height,
                     mode_names(kColorModes)));
   }
+
   const json parsed = json::parse(calibration.begin(), calibration.end(), nullptr, false);
   const auto depth_camera = camera_in_mode(camera_for(parsed, "PurposeDepth"), *depth);
   if (!depth_camera) return tl::unexpected(depth_camera.error());
+
   const auto color_camera = camera_in_mode(camera_for(parsed, "PurposePhotoVideo"), *color);
   if (!color_camera) return tl::unexpected(color_camera.error());
 
@@ -234,30 +241,36 @@ core::Result<void> AzureKinectFile::understand(const ContainerContents& contents
     if (title == "COLOR" || !tag_of(track, "K4A_COLOR_MODE").empty()) color_ = {static_cast<int>(i), track};
     if (title == "DEPTH" || !tag_of(track, "K4A_DEPTH_MODE").empty()) depth_ = {static_cast<int>(i), track};
   }
+
   if (color_.number < 0) return core::input_error("it has no track COLOR");
   if (depth_.number < 0) return core::input_error("it has no track DEPTH");
   if (!is_color_format(color_.info)) {
     return core::input_error(fmt::format("colour is stored as {} {} (known: mjpeg, NV12, YUY2, BGRA)",
                                          color_.info.codec, color_.info.fourcc));
   }
+
   if (depth_.info.codec != "rawvideo" || depth_.info.fourcc != "b16g") {
     return core::input_error(fmt::format("depth is stored as {} {} (known: rawvideo b16g)", depth_.info.codec,
                                          depth_.info.fourcc));
   }
+
   const auto calibration =
       std::find_if(contents.attachments.begin(), contents.attachments.end(),
                    [](const ContainerAttachment& a) { return a.name == "calibration.json"; });
   if (calibration == contents.attachments.end())
     return core::input_error("it has no attachment calibration.json");
+
   color_mode_ = tag_of(color_.info, "K4A_COLOR_MODE");
   depth_mode_ = tag_of(depth_.info, "K4A_DEPTH_MODE");
   auto camera = azure_kinect_camera(std::string(calibration->bytes.begin(), calibration->bytes.end()),
                                     depth_mode_, color_.info.height);
   if (!camera) return tl::unexpected(camera.error());
+
   camera_ = std::move(*camera);
   const bool sizes = camera_.color.width == color_.info.width && camera_.depth->width == depth_.info.width &&
                      camera_.depth->height == depth_.info.height;
   if (!sizes) return core::input_error("its images have other sizes than its modes");
+
   return {};
 }
 
@@ -298,13 +311,16 @@ core::Result<Bytes> AzureKinectFile::packet_of(const Track& track, std::int64_t 
   constexpr std::int64_t kBehind_us = 1'000'000;  // tracks are that far apart in the file, at most
   const std::lock_guard lock(mutex_);
   if (const ContainerPacket* known = passed(track.number, stamp_us)) return known->bytes;
+
   if (at_us_ < 0 || stamp_us <= at_us_ || stamp_us > at_us_ + kFar_us) {
     recent_.clear();
     if (!demuxer_.seek(container_, track.number, stamp_us))
       return core::input_error(
           fmt::format("{}: {:.6f} s cannot be found", file_, 1e-6 * static_cast<double>(stamp_us)));
   }
+
   ContainerPacket packet;
+
   while (demuxer_.next(container_, packet, true)) {
     const bool ours = packet.track == color_.number || packet.track == depth_.number;
     if (!ours) continue;
@@ -315,6 +331,7 @@ core::Result<Bytes> AzureKinectFile::packet_of(const Track& track, std::int64_t 
     if (it) return recent_.back().bytes;
     if (past) break;
   }
+
   at_us_ = -1;
   return core::input_error(
       fmt::format("{}: the image at {:.6f} s cannot be read", file_, 1e-6 * static_cast<double>(stamp_us)));

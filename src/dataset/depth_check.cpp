@@ -21,6 +21,7 @@ core::Result<DepthStatistics> sample_depth(const FrameSource& source, const std:
   DepthStatistics statistics;
   bool readable = false;
   std::string first_error;
+
   const auto add = [&](std::size_t i) {
     if (const auto frame = source.read(i)) {
       readable = true;
@@ -29,6 +30,7 @@ core::Result<DepthStatistics> sample_depth(const FrameSource& source, const std:
       first_error = frame.error().message;
     }
   };
+
   for (const std::size_t i : spread(source.size(), kDepthSamples)) add(i);
   for (std::size_t i = 0; i < source.size() && !statistics.median(); ++i) add(i);
   if (statistics.median()) return statistics;
@@ -36,6 +38,7 @@ core::Result<DepthStatistics> sample_depth(const FrameSource& source, const std:
     return core::input_error(fmt::format("{}: none of the {} pairs can be read; the first: {}", folder,
                                          source.size(), first_error));
   }
+
   return core::input_error(
       fmt::format("{}: the depth images hold no measurement at all (raw 0 and 65535 are none)", folder));
 }

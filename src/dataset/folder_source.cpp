@@ -43,14 +43,17 @@ class FolderSource final : public FrameSource {
     const PairInfo& pair = layout_.pairs.at(index);
     auto color = read_color(layout_, pair.color_file, camera_.color, video_.get());
     if (!color) return tl::unexpected(color.error());
+
     auto depth = read_depth(layout_, pair.depth_file, camera_.depth ? *camera_.depth : camera_.color,
                             camera_.depth_scale);
     if (!depth) return tl::unexpected(depth.error());
+
     if (!layout_.confidence.empty()) {
       const auto mask =
           std::filesystem::path(layout_.confidence) / std::filesystem::path(pair.depth_file).filename();
       if (auto masked = mask_depth(mask.string(), *depth); !masked) return tl::unexpected(masked.error());
     }
+
     std::optional<sensor::Rectifier> own;
     if (pair.camera >= 0) own.emplace(camera_of(pair), rectified_);
     const sensor::Rectifier& rectifier = own ? *own : rectifier_;

@@ -166,8 +166,10 @@ core::Result<void> check_image_kinds(const Layout& layout, sensor::Camera& camer
   if (depth.type() == CV_16UC3 && channels_are_equal(depth))
     log.info("the depth images have three equal channels; the first is used");
   if (depth.type() != CV_32FC1 && depth.type() != CV_64FC1) return {};
+
   cv::Mat metres;
   depth.convertTo(metres, CV_32F);
+
   const auto median = median_of(metres);
   if (median && *median > kFarthestMedian_m) {
     return core::input_error(
@@ -176,6 +178,7 @@ core::Result<void> check_image_kinds(const Layout& layout, sensor::Camera& camer
                     "divide by 1000)",
                     layout.pairs.front().depth_file, *median));
   }
+
   camera.depth_scale = kFloatDepthScale;
   log.info("the depth images hold metres as floats; they are read in steps of 0.2 mm, up to 13.1 m");
   return {};

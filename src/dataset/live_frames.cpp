@@ -135,9 +135,11 @@ class LiveFrames::Store {
   core::Result<void> push(const LiveFrame& frame) {
     auto images = checked(frame.color, frame.depth);
     if (!images) return tl::unexpected<core::Error>(images.error());
+
     const double depth_stamp = frame.depth_stamp.value_or(frame.stamp);
     const std::lock_guard lock(mutex_);
     if (closed_) return core::input_error("no frame is taken any more: the recording is closed");
+
     if (!std::isfinite(frame.stamp) || !std::isfinite(depth_stamp))
       return core::input_error(
           fmt::format("stamps are finite seconds, not {} and {}", frame.stamp, depth_stamp));
@@ -259,6 +261,7 @@ class LiveFrames::Store {
       return tl::unexpected<core::Error>(fits.error());
     if (auto fits = check_size("depth", depth, depth_camera()); !fits)
       return tl::unexpected<core::Error>(fits.error());
+
     LiveImages images;
     if (color.type() == CV_8UC1) {
       cv::cvtColor(color, images.color, cv::COLOR_GRAY2BGR);
@@ -278,6 +281,7 @@ class LiveFrames::Store {
       return core::input_error(
           "depth has neither 16 bits (units of 1 / depth_scale metres) nor floats (metres)");
     }
+
     return images;
   }
 

@@ -103,6 +103,7 @@ core::Result<void> select(const OpenOptions& options, const std::string& folder,
   if (options.every < 1) {
     return core::usage_error(fmt::format("every: {} is not possible (allowed: 1 and more)", options.every));
   }
+
   const double start = pairs.front().stamp;
   const double duration = pairs.back().stamp - start;
   std::vector<PairInfo> kept;
@@ -112,11 +113,13 @@ core::Result<void> select(const OpenOptions& options, const std::string& folder,
     if (!(t >= options.from_s && t <= options.to_s)) continue;
     if (inside++ % static_cast<std::size_t>(options.every) == 0) kept.push_back(std::move(pair));
   }
+
   if (kept.empty()) {
     return core::usage_error(
         fmt::format("{}: nothing lies between {} s and {} s: the recording is {:.2f} s long", folder,
                     options.from_s, options.to_s, duration));
   }
+
   pairs = std::move(kept);
   return {};
 }
@@ -140,21 +143,25 @@ core::Result<TrajectoryReading> recording_poses(const fs::path& folder, core::Lo
   const auto chosen = choose_camera(folder, {}, log);
   LayoutOptions options;
   if (chosen && *chosen) options.fps = (*chosen)->reading.camera.fps;
+
   auto layout = read_layout(folder, "auto", options, log);
   if (!layout) return tl::unexpected(layout.error());
   if (!layout->truth || layout->truth->empty()) {
     return core::input_error(
         fmt::format("{}: is a recording ({}) without poses", folder.string(), layout->format));
   }
+
   TrajectoryReading reading;
   reading.poses = std::move(*layout->truth);
   reading.format = layout->format;
+
   for (const geometry::StampedPose& pose : reading.poses) reading.rows.push_back(pose.stamp);
   if (layout->truth_is_odometry) {
     reading.notes.push_back(
         fmt::format("the {} poses to compare with are those of the recorder's own odometry, no truth",
                     reading.poses.size()));
   }
+
   return reading;
 }
 
@@ -165,20 +172,24 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
     return core::input_error(
         fmt::format("{}: no such folder or file; give the folder of a recording, or a bag", folder.string()));
   }
+
   // A missing camera must not hide that there is no recording; a layout without stamps needs the camera's
   // fps.
   const auto chosen = choose_camera(folder, options, log);
   LayoutOptions layout_options;
   layout_options.max_pair_gap_s = options.max_pair_gap_s;
+
   if (chosen && *chosen) {
     layout_options.fps = (*chosen)->reading.camera.fps;
     layout_options.depth_delay_s = (*chosen)->reading.camera.depth_delay_s;
   }
+
   auto layout = read_any(folder, options, layout_options, log);
   if (!layout) return tl::unexpected(layout.error());
   round_stamps(layout->pairs);
   drop_same_stamps(folder.string(), layout->pairs, log);
   if (!chosen) return tl::unexpected(chosen.error());
+
   auto camera = complete_camera(folder, *chosen, *layout, log);
   if (!camera) return tl::unexpected(camera.error());
   layout->color_reduction = stored_reduction(*layout, *camera);
@@ -186,6 +197,7 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
   if (auto kinds = check_image_kinds(*layout, *camera, log); !kinds) return tl::unexpected(kinds.error());
   if (auto selected = select(options, folder.string(), layout->pairs); !selected)
     return tl::unexpected(selected.error());
+
   for (PairInfo& pair : layout->pairs) pair.depth_stamp += camera->depth_delay_s;
 
   fs::path place = fs::weakly_canonical(folder, ignored);  // "." and "room/" have names too

@@ -23,6 +23,7 @@ std::vector<PairInfo> pair_by_stamp(const std::vector<StampedFile>& color,
   const double reach = max_gap_s + kStampResolution;
   // Gap in microseconds, which is what stamps are good to; colour, depth.
   std::vector<std::tuple<long long, std::size_t, std::size_t>> candidates;
+
   for (std::size_t i = 0; i < color.size(); ++i) {
     const double stamp = color[i].stamp - depth_delay_s;  // of depth taken at the same moment
     for (auto d = std::lower_bound(depth.begin(), depth.end(), stamp - reach, earlier);
@@ -31,6 +32,7 @@ std::vector<PairInfo> pair_by_stamp(const std::vector<StampedFile>& color,
                               static_cast<std::size_t>(d - depth.begin()));
     }
   }
+
   std::sort(candidates.begin(), candidates.end());
 
   constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
@@ -41,12 +43,14 @@ std::vector<PairInfo> pair_by_stamp(const std::vector<StampedFile>& color,
     depth_of[i] = j;
     used[j] = true;
   }
+
   std::vector<PairInfo> pairs;
   for (std::size_t i = 0; i < color.size(); ++i) {
     if (depth_of[i] == none) continue;
     const StampedFile& d = depth[depth_of[i]];
     pairs.push_back({color[i].stamp, d.stamp, color[i].file, d.file});
   }
+
   return pairs;
 }
 
@@ -76,6 +80,7 @@ core::Result<void> check_files(const std::string& list, const std::vector<Stampe
     if (std::filesystem::exists(file.file, ignored)) continue;
     if (missing++ == 0) first = &file;
   }
+
   if (missing == 0) return {};
   if (missing == files.size()) {
     return core::input_error(
@@ -83,6 +88,7 @@ core::Result<void> check_files(const std::string& list, const std::vector<Stampe
                     "folder beside the list or correct the list",
                     list, first->line, first->file, files.size()));
   }
+
   log.warning(fmt::format("{}:{}: {} of {} files do not exist, these frames are skipped (first: {})", list,
                           first->line, missing, files.size(), first->file));
   return {};

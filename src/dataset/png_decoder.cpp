@@ -49,11 +49,13 @@ std::string read_chunks(const Bytes& file, Header& header, Bytes& compressed) {
     if (file.size() - at < kChunkOverhead) return "the file ends before the image does";
     const std::size_t length = big_endian(&file[at]);
     if (length > file.size() - at - kChunkOverhead) return "the file ends before the image does";
+
     const std::uint8_t* type = &file[at + 4];
     const std::uint8_t* data = &file[at + 8];
     if (libdeflate_crc32(0, type, length + 4) != big_endian(data + length)) {
       return fmt::format("checksum is wrong at byte {}", at);
     }
+
     if (std::memcmp(type, "IHDR", 4) == 0 && length == 13) {
       if (big_endian(data) - 1 >= 1U << 24 || big_endian(data + 4) - 1 >= 1U << 24) return "impossible size";
       header = {static_cast<int>(big_endian(data)), static_cast<int>(big_endian(data + 4)), data[8], data[9],
@@ -64,6 +66,7 @@ std::string read_chunks(const Bytes& file, Header& header, Bytes& compressed) {
     } else if (std::memcmp(type, "IEND", 4) == 0) {
       return have_header ? "" : "there is no header";
     }
+
     at += length + kChunkOverhead;
   }
 }
@@ -84,6 +87,7 @@ bool unfilter_row(int filter, std::uint8_t* row, const std::uint8_t* above, std:
   switch (filter) {
     case 0:
       return true;
+
     case 1: {
       std::uint8_t left[B] = {};
       for (std::size_t i = 0; i < size; i += B) {
@@ -94,9 +98,11 @@ bool unfilter_row(int filter, std::uint8_t* row, const std::uint8_t* above, std:
       }
       return true;
     }
+
     case 2:
       for (std::size_t i = 0; i < size; ++i) add(row[i], above[i]);
       return true;
+
     case 3: {
       std::uint8_t left[B] = {};
       for (std::size_t i = 0; i < size; i += B) {
@@ -107,9 +113,11 @@ bool unfilter_row(int filter, std::uint8_t* row, const std::uint8_t* above, std:
       }
       return true;
     }
+
     case 4: {
       int left[B] = {};
       int corner[B] = {};
+
       for (std::size_t i = 0; i < size; i += B) {
         for (std::size_t c = 0; c < B; ++c) {
           const int up = above[i + c];
@@ -118,6 +126,7 @@ bool unfilter_row(int filter, std::uint8_t* row, const std::uint8_t* above, std:
           corner[c] = up;
         }
       }
+
       return true;
     }
     default:
@@ -175,9 +184,11 @@ Decoded decode_png(const Bytes& file) {
   Header header;
   Bytes compressed;
   compressed.reserve(file.size());
+
   if (const std::string wrong = read_chunks(file, header, compressed); !wrong.empty()) {
     return tl::unexpected<std::string>(wrong);
   }
+
   if (static_cast<std::int64_t>(header.width) * header.height > kMaxPixels) {
     return tl::unexpected<std::string>("the image is too large");
   }
@@ -187,9 +198,11 @@ Decoded decode_png(const Bytes& file) {
   // it
   const std::size_t size = (header.row_bytes() + 1) * static_cast<std::size_t>(header.height);
   if (size / 1032 > compressed.size()) return tl::unexpected<std::string>("the image data is too short");
+
   const std::unique_ptr<std::uint8_t[]> pixels(new std::uint8_t[size]);  // all of it is written to
   const std::unique_ptr<libdeflate_decompressor, decltype(&libdeflate_free_decompressor)> inflater(
       libdeflate_alloc_decompressor(), &libdeflate_free_decompressor);
+
   std::size_t produced = 0;
   const auto status = libdeflate_zlib_decompress(inflater.get(), compressed.data(), compressed.size(),
                                                  pixels.get(), size, &produced);
@@ -197,6 +210,7 @@ Decoded decode_png(const Bytes& file) {
     return tl::unexpected<std::string>("the image data cannot be inflated");
   }
   if (!unfilter_any(header, pixels.get())) return tl::unexpected<std::string>("unknown row filter");
+
   return to_image(header, pixels.get());
 }
 

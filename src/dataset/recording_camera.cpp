@@ -66,8 +66,10 @@ core::Result<std::optional<fs::path>> find_camera_file(const fs::path& folder, c
     if (i < kMustBeCameras || sensor::is_foreign_camera_file(file, true)) return file;
     log.warning(fmt::format("{}: is not a known camera file; it is not used", file.string()));
   }
+
   const std::vector<fs::path> found = foreign_camera_files(folder);
   if (found.empty()) return std::nullopt;
+
   const auto first = sensor::read_camera_file(found.front());
   for (const fs::path& file : found) {
     const auto reading = sensor::read_camera_file(file);
@@ -77,6 +79,7 @@ core::Result<std::optional<fs::path>> find_camera_file(const fs::path& folder, c
         fmt::format("{} and {} are both camera files, and they differ; name one with --camera",
                     found.front().string(), file.string()));
   }
+
   return found.front();
 }
 
@@ -121,6 +124,7 @@ std::optional<sensor::Camera> guessed_camera(const Layout& layout) {
     int height;
     double focal_px;
   };
+
   constexpr std::array<Device, 4> kDevices = {{
       {"Kinect or Xtion", 640, 480, 525.0},  // as their drivers and 7-Scenes, TUM and Redwood assume
       {"RealSense D400", 1280, 720, 920.0},  // 69 x 42 degrees by its data sheet
@@ -129,8 +133,10 @@ std::optional<sensor::Camera> guessed_camera(const Layout& layout) {
   }};
   const auto size = color_size(layout);
   if (!size) return std::nullopt;
+
   for (const Device& device : kDevices) {
     if (*size != cv::Size(device.width, device.height)) continue;
+
     sensor::Camera camera;
     camera.name = device.name;
     camera.color = {size->width,
@@ -141,8 +147,10 @@ std::optional<sensor::Camera> guessed_camera(const Layout& layout) {
                     0.5 * (size->height - 1)};
     camera.depth_scale = usual_depth_scale(layout);
     camera.guess = true;
+
     return camera;
   }
+
   return std::nullopt;
 }
 
@@ -263,6 +271,7 @@ core::Result<sensor::Camera> guess(const fs::path& folder, const Layout& layout,
         "(shipped: tum_fr1, tum_fr2, tum_fr3, icl_nuim, seven_scenes; or a file, also of another program)",
         folder.string()));
   }
+
   std::string text = fmt::format(
       "{}: no camera.yaml; its images have the size of a {}, so fx = fy = {:g} is guessed; put a camera.yaml "
       "there or name one with --camera",
@@ -272,6 +281,7 @@ core::Result<sensor::Camera> guess(const fs::path& folder, const Layout& layout,
         "; 7-Scenes as it is published has depth that is not registered to colour: --camera seven_scenes "
         "registers it";
   }
+
   log.warning(text);
   return *camera;
 }
@@ -312,10 +322,12 @@ core::Result<sensor::Camera> complete_camera(const fs::path& folder, const std::
   std::optional<ChosenCamera> chosen = given;
   if (!chosen && layout.camera) chosen = ChosenCamera{*layout.camera, folder.string(), true};
   if (!chosen) return guess(folder, layout, log);
+
   if (!chosen->of_layout) {
     layout.frame_cameras.clear();
     for (PairInfo& pair : layout.pairs) pair.camera = -1;
   }
+
   sensor::Camera camera = chosen->reading.camera;
   const bool foreign = !chosen->reading.program.empty();  // our own is complete, and checked
   if (foreign) {
@@ -325,6 +337,7 @@ core::Result<sensor::Camera> complete_camera(const fs::path& folder, const std::
     if (const std::string wrong = sensor::camera_problem(camera); !wrong.empty())
       return core::usage_error(fmt::format("{}: {}", chosen->file, wrong));
   }
+
   share_calibration(layout, camera);
   if (foreign) log.info(understood(*chosen, camera, layout));
 

@@ -28,6 +28,7 @@ std::string to_text(const FrameSource& source) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < source.size(); ++i)
     steps.push_back(source.info(i).stamp - source.info(i - 1).stamp);
+
   const double duration_s = std::accumulate(steps.begin(), steps.end(), 0.0);
   const double longest_s = steps.empty() ? 0.0 : *std::max_element(steps.begin(), steps.end());
   const double usual_s = steps.empty() ? 0.0 : core::median(std::move(steps));
@@ -48,6 +49,7 @@ std::string to_text(const FrameSource& source) {
     statistics.add(frame->depth);
     ++read;
   }
+
   if (const double median_m = statistics.median().value_or(0.0); median_m > 0.0) {
     text += fmt::format(
         "depth: median {:.2f} m, {:.0f} % of the pixels without measurement ({} frames sampled)\n", median_m,
@@ -55,10 +57,12 @@ std::string to_text(const FrameSource& source) {
   } else {
     text += fmt::format("depth: none in {} sampled frames\n", read);
   }
+
   if (read < sampled.size())
     text += fmt::format("unreadable: {} of {} sampled frames\n", sampled.size() - read, sampled.size());
   const auto truth = source.truth();
   if (!truth) return text + "truth: no\n";
+
   return text + (source.truth_is_odometry()
                      ? fmt::format("poses: {} of the recorder's own odometry\n", truth->size())
                      : std::string("truth: yes\n"));

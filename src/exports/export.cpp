@@ -69,19 +69,23 @@ core::Result<Choice> chosen_by_ending(const ExportRequest& request) {
   Choice best;
   std::size_t longest = 0;
   std::vector<std::string> endings;
+
   const bool folder = !request.output.has_extension();
   for (const Format& format : formats()) {
     if (folder && format.endings.empty() && holds(format, request.content))
       return Choice{&format, request.content};
+
     const std::size_t length = fitting_ending(format, name);
     const bool fits = holds(format, request.content);
     if (fits) endings.insert(endings.end(), format.endings.begin(), format.endings.end());
+
     // The requested content outweighs the content that the ending suggests.
     const std::size_t rank = length == 0 ? 0 : 2 * length + (fits ? 1 : 0);
     if (rank <= longest || (!fits && request.content != Content::kCloud)) continue;
     longest = rank;
     best = {&format, fits ? request.content : format.contents.front()};
   }
+
   const bool text_of_a_path = best.content != request.content && request.output.extension() == ".txt";
   if (best.format != nullptr && !text_of_a_path) return best;
   std::sort(endings.begin(), endings.end());

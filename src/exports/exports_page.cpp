@@ -117,6 +117,7 @@ std::string exports_page() {
     page += fmt::format("| [{0}](#{0}) | {1} | {2} | {3} |\n", format.name, endings_text(format),
                         format.title, format.needs);
   }
+
   page +=
       "\nFormats with the same ending are selected by `--what trajectory|keyframes|lines` and `--mesh`. "
       "There is "
@@ -127,11 +128,13 @@ std::string exports_page() {
       "`exports:` of the stage `output` they are written as here, on the command line as `--dense-points "
       "1000`.\n\n{}",
       flags_text(common_options()), options_text());
+
   for (const FormatInfo& format : infos) {
     page += fmt::format("\n## {}\n\n{}: {}.{}\n\n{}\n", format.name, format.title, endings_text(format),
                         format.options.empty() ? "" : " Takes " + flags_text(format.options) + ".",
                         format.description);
   }
+
   return page;
 }
 

@@ -13,6 +13,7 @@ void ExportOptions::declare(core::OptionTable& table) {
   table.number(
       "voxel", voxel_m, {0.0, 10.0}, "m",
       "Fuse the cloud again from map.db with voxels of this size, or thin a cloud file; 0: unchanged");
+
   table.numbers("datum", datum, 0, {-360.0, 360.0}, "",
                 "Position of the map's origin on Earth, for UTM: latitude,longitude,heading of its x axis; "
                 "degrees, clockwise from north");
@@ -20,6 +21,7 @@ void ExportOptions::declare(core::OptionTable& table) {
   table.numbers("origin", origin, 0, {-kWorld_m, kWorld_m}, "",
                 "East,north,height of the map's origin in --epsg, metres; a fourth number turns the map "
                 "clockwise, degrees");
+
   table.number("resolution", resolution_m, {0.0, 10.0}, "m",
                "Cell size of a grid (0: 5 cm), or approximate edge length of a mesh (0: 2 cm)");
   table.numbers("heights", heights, 2, {-100.0, 100.0}, "m",
@@ -27,6 +29,7 @@ void ExportOptions::declare(core::OptionTable& table) {
   table.boolean("text", text, "Write COLMAP's text files instead of binary ones");
   table.integer("every", every, {0, 100000}, "",
                 "Export every N-th tracked frame besides the keyframes; 0: keyframes only");
+
   table.boolean("sharpest", sharpest, "Replace each keyframe by the sharpest picture near it, for splatting");
   table.integer("dense_points", dense_points, {0, 100000000}, "",
                 "Number of points of the cloud to write instead of landmarks; 0: landmarks");
@@ -34,6 +37,7 @@ void ExportOptions::declare(core::OptionTable& table) {
   table.boolean("ascii", ascii, "Write text instead of binary");
   table.number("reach", reach_m, {0.001, 10.0}, "m",
                "Distance from every point beyond which a mesh's surface is left out");
+
   table.integer("points", points, {0, 2000000000}, "",
                 "Largest number of points; the cloud is thinned by voxels; 0: all");
   table.number("cut", cut_m, {0.0, 100.0}, "m", "Height of the cut over the floor");

@@ -30,6 +30,7 @@ bool make_template(const CornerPatch& patch, Template& to) {
   float mean_x = 0.0F;
   float mean_y = 0.0F;
   int i = 0;
+
   for (int v = 1; v <= kAcross; ++v) {
     const std::uint8_t* row = patch.gray.data() + v * kSide + 1;
     for (int u = 0; u < kAcross; ++u, ++i) {
@@ -42,10 +43,12 @@ bool make_template(const CornerPatch& patch, Template& to) {
       mean_y += to.dy[k];
     }
   }
+
   mean /= kCount;
   mean_x /= kCount;
   mean_y /= kCount;
   Eigen::Matrix3f normal = Eigen::Matrix3f::Zero();
+
   for (std::size_t k = 0; k < kCount; ++k) {
     to.value[k] -= mean;
     to.dx[k] -= mean_x;
@@ -57,10 +60,12 @@ bool make_template(const CornerPatch& patch, Template& to) {
     normal(1, 2) += to.dy[k] * to.value[k];
     normal(2, 2) += to.value[k] * to.value[k];
   }
+
   to.power = normal(2, 2);
   const Eigen::Matrix3f full = normal.selfadjointView<Eigen::Upper>();
   const float across = full(0, 0) * full(1, 1) - full(0, 1) * full(0, 1);
   if (full(0, 0) + full(1, 1) < kLeast || across < kLeast * (full(0, 0) + full(1, 1))) return false;
+
   bool invertible = false;
   full.computeInverseWithCheck(to.inverse, invertible, 1.0F);
   return invertible && to.inverse.allFinite();
@@ -75,9 +80,11 @@ bool sample(const cv::Mat& level, const Eigen::Vector2f& at, const Eigen::Matrix
       !(at.x() + reach_x < static_cast<float>(level.cols - 1)) ||
       !(at.y() + reach_y < static_cast<float>(level.rows - 1)))
     return false;
+
   const auto step = static_cast<std::ptrdiff_t>(level.step1());
   const std::uint8_t* origin = level.ptr<std::uint8_t>(0);
   mean = 0.0F;
+
   std::size_t k = 0;
   for (int v = -kReach; v <= kReach; ++v) {
     const Eigen::Vector2f row = at + level_from_patch.col(1) * static_cast<float>(v);
@@ -86,6 +93,7 @@ bool sample(const cv::Mat& level, const Eigen::Vector2f& at, const Eigen::Matrix
       const float y = row.y() + level_from_patch(1, 0) * static_cast<float>(u);
       const int x0 = static_cast<int>(x);
       const int y0 = static_cast<int>(y);
+
       const float fx = x - static_cast<float>(x0);
       const float fy = y - static_cast<float>(y0);
       const std::uint8_t* p = origin + y0 * step + x0;
@@ -95,6 +103,7 @@ bool sample(const cv::Mat& level, const Eigen::Vector2f& at, const Eigen::Matrix
       mean += values[k];
     }
   }
+
   mean /= kCount;
   return true;
 }
@@ -121,13 +130,16 @@ std::optional<Eigen::Vector2f> align_patch(const CornerPatch& patch, const cv::M
   constexpr float kLeastGain = 0.3F;
   Template sought;
   if (!make_template(patch, sought)) return std::nullopt;
+
   Eigen::Vector2f at = start;
   std::array<float, kCount> values;
   float gain = 1.0F;
+
   bool settled = false;
   for (int i = 0; i <= kSteps; ++i) {
     float mean = 0.0F;
     if (!sample(level, at, level_from_patch, values, mean)) return std::nullopt;
+
     Eigen::Vector3f slope = Eigen::Vector3f::Zero();
     float product = 0.0F;
     float power = 0.0F;
@@ -138,10 +150,12 @@ std::optional<Eigen::Vector2f> align_patch(const CornerPatch& patch, const cv::M
       product += value * sought.value[k];
       power += value * value;
     }
+
     if (settled) {
       if (product < kLeastAlike * std::sqrt(power * sought.power)) return std::nullopt;
       return at;
     }
+
     const Eigen::Vector3f step = sought.inverse * slope;
     gain += step.z();
     const Eigen::Vector2f moved = level_from_patch * step.head<2>() / std::max(kLeastGain, gain);
@@ -149,6 +163,7 @@ std::optional<Eigen::Vector2f> align_patch(const CornerPatch& patch, const cv::M
     if (!((at - start).norm() <= kFarthest_px)) return std::nullopt;
     settled = moved.norm() < kSettled_px;
   }
+
   return std::nullopt;
 }
 

@@ -31,6 +31,7 @@ cv::Mat make_thumbnail_depth(const cv::Mat& depth, const cv::Size& size) {
   if (depth.empty()) return result;
   const float step_x = static_cast<float>(depth.cols) / static_cast<float>(size.width);
   const float step_y = static_cast<float>(depth.rows) / static_cast<float>(size.height);
+
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       std::array<float, 5> found{};
@@ -42,11 +43,13 @@ cv::Mat make_thumbnail_depth(const cv::Mat& depth, const cv::Size& size) {
         const float z = depth.at<float>(py, px);
         if (z > 0.0F) found[count++] = z;
       }
+
       if (count < 3) continue;
       std::sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(count));
       result.at<float>(y, x) = found[count / 2];
     }
   }
+
   return result;
 }
 
@@ -59,12 +62,14 @@ bool at_border(const cv::Mat& depth, const Eigen::Vector2f& pixel, float reach) 
     const int v = cvRound(p.y());
     return u < 0 || v < 0 || u >= depth.cols || v >= depth.rows ? 0.0F : depth.at<float>(v, u);
   };
+
   constexpr std::array<float, 4> kRings{0.4F, 0.7F, 1.0F, 1.3F};
   constexpr float kDiagonal = 0.70710678F;
   const std::array<Eigen::Vector2f, 4> ways{
       Eigen::Vector2f(1.0F, 0.0F), Eigen::Vector2f(kDiagonal, kDiagonal), Eigen::Vector2f(0.0F, 1.0F),
       Eigen::Vector2f(-kDiagonal, kDiagonal)};
   constexpr std::size_t kPairs = 16;
+
   const float here = at(pixel);
   if (!(here > 0.0F)) {
     for (const float ring : kRings) {
@@ -74,8 +79,10 @@ bool at_border(const cv::Mat& depth, const Eigen::Vector2f& pixel, float reach) 
     }
     return false;
   }
+
   const float tolerance = 0.01F + 4.0F * static_cast<float>(sensor::depth_sigma(here)) / here;
   std::size_t seen = 0;
+
   for (const float ring : kRings) {
     for (const Eigen::Vector2f& way : ways) {
       const float a = at(pixel + ring * reach * way);
@@ -85,6 +92,7 @@ bool at_border(const cv::Mat& depth, const Eigen::Vector2f& pixel, float reach) 
       if (std::abs(0.5F * (here / a + here / b) - 1.0F) > tolerance) return true;
     }
   }
+
   return 4 * seen < 3 * kPairs;
 }
 
@@ -93,6 +101,7 @@ void empty_patches_at_borders(const cv::Mat& depth, const OrbExtractor& extracto
   if (depth.empty()) return;
   constexpr int kSteps = 5;  // from the corner to the end of the tested range
   std::vector<float> roughness;
+
   std::vector<std::size_t> asked;
   for (std::size_t i = 0; i < orb.points.size(); ++i) {
     const Eigen::Vector2f& pixel = orb.points[i].pixel;
@@ -101,12 +110,14 @@ void empty_patches_at_borders(const cv::Mat& depth, const OrbExtractor& extracto
       orb.patches[i].gray.fill(0);
       continue;
     }
+
     const int x = std::clamp(cvRound(pixel.x()), 0, depth.cols - 1);
     const int y = std::clamp(cvRound(pixel.y()), 0, depth.rows - 1);
     if (!(depth.at<float>(y, x) > 0.0F)) continue;  // nothing is known
     roughness.push_back(depth_roughness(depth, x, y, cvRound(reach), std::max(1, cvRound(reach) / kSteps)));
     asked.push_back(i);
   }
+
   const float limit = roughness_limit(roughness);
   for (std::size_t k = 0; k < asked.size(); ++k) {
     if (roughness[k] > limit) orb.patches[asked[k]].gray.fill(0);
@@ -139,6 +150,7 @@ void PointGrid::within(const std::vector<PointFeature>& points, float x, float y
     return std::clamp(static_cast<int>(std::floor(v / static_cast<float>(kCell))), 0, count - 1);
   };
   const float radius_sq = radius * radius;
+
   for (int r = cell(y - radius, rows_); r <= cell(y + radius, rows_); ++r) {
     for (int c = cell(x - radius, columns_); c <= cell(x + radius, columns_); ++c) {
       const auto k = static_cast<std::size_t>(r * columns_ + c);
@@ -163,8 +175,10 @@ CornerDepth corner_depth(const cv::Mat& depth, float x, float y) {
   int count = 0;
   Eigen::Matrix3f normal = Eigen::Matrix3f::Zero();
   Eigen::Vector3f right = Eigen::Vector3f::Zero();
+
   for (int v = std::max(0, cy - kRadius); v <= std::min(depth.rows - 1, cy + kRadius); ++v) {
     const float* row = depth.ptr<float>(v);
+
     for (int u = std::max(0, cx - kRadius); u <= std::min(depth.cols - 1, cx + kRadius); ++u) {
       const float z = row[u];
       if (!(z > 0.0F)) continue;
@@ -176,9 +190,11 @@ CornerDepth corner_depth(const cv::Mat& depth, float x, float y) {
       ++count;
     }
   }
+
   if (count < 8) return {};
   const double tolerance = 0.01 * nearest + 6.0 * sensor::depth_sigma(nearest);
   if (farthest - nearest > tolerance) return {};
+
   const Eigen::Vector3f plane = normal.ldlt().solve(right);
   const float z = 1.0F / plane.x();
   // Too few neighbouring measurements to determine a slant.
@@ -200,6 +216,7 @@ FeatureExtractor::FeatureExtractor(const FeatureOptions& options, const sensor::
 FrameFeatures FeatureExtractor::extract(const sensor::RgbdFrame& frame) const {
   FrameFeatures result;
   if (frame.gray.empty()) return result;
+
   if (options_.points) {
     OrbFeatures orb = orb_.extract(frame.gray, valid_region(frame.gray));
     result.slants.reserve(orb.points.size());
@@ -208,12 +225,14 @@ FrameFeatures FeatureExtractor::extract(const sensor::RgbdFrame& frame) const {
       p.depth = found.z;
       result.slants.push_back(found.slant);
     }
+
     empty_patches_at_borders(frame.depth, orb_, orb);
     result.points = std::move(orb.points);
     result.descriptors = std::move(orb.descriptors);
     result.patches = std::move(orb.patches);
     result.levels = std::move(orb.levels);
   }
+
   if (options_.points || options_.lines)
     result.grid = PointGrid(result.points, frame.gray.cols, frame.gray.rows);
   if (options_.lines) result.lines = lines_.extract(frame.gray, frame.depth, camera_);

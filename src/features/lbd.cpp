@@ -162,6 +162,7 @@ class RowSummer {
     cv::v_int32x4 along = cv::v_setzero_s32();
     cv::v_int32x4 along_abs = cv::v_setzero_s32();
     cv::v_int32x4 across = cv::v_setzero_s32();
+
     cv::v_int32x4 across_abs = cv::v_setzero_s32();
     for (int k = 0; k < columns; k += 4) {
       const cv::v_int16x8 g = cv::v_reinterpret_as_s16(cv::v_load(row.data() + k));
@@ -172,6 +173,7 @@ class RowSummer {
       across = across + c;
       across_abs = across_abs + cv::v_reinterpret_as_s32(cv::v_abs(c));
     }
+
     const auto a = static_cast<float>(cv::v_reduce_sum(along));
     const auto a_abs = static_cast<float>(cv::v_reduce_sum(along_abs));
     const auto c = static_cast<float>(cv::v_reduce_sum(across));
@@ -209,6 +211,7 @@ void normalise(float* values, std::size_t count) {
 BandStatistics band_statistics(const RowSums& sums, const Weights& weights) {
   std::array<std::array<float, 4>, kBands + 2> mean{};  // one more band at each side for samples outside
   std::array<std::array<float, 4>, kBands + 2> square{};
+
   for (std::size_t row = 0; row < kRows; ++row) {
     for (std::size_t k = 0; k < 3; ++k) {
       const float weight = weights.value[row][k];
@@ -220,6 +223,7 @@ BandStatistics band_statistics(const RowSums& sums, const Weights& weights) {
       }
     }
   }
+
   std::array<float, 4 * kBands> means{};
   std::array<float, 4 * kBands> deviations{};
   for (std::size_t j = 0; j < kBands; ++j) {
@@ -230,8 +234,10 @@ BandStatistics band_statistics(const RowSums& sums, const Weights& weights) {
       deviations[4 * j + c] = std::sqrt(std::max(0.0F, square[j + 1][c] * share - m * m));
     }
   }
+
   normalise(means.data(), means.size());
   normalise(deviations.data(), deviations.size());
+
   BandStatistics result;
   for (std::size_t j = 0; j < kBands; ++j) {
     for (std::size_t c = 0; c < 4; ++c) {
@@ -239,6 +245,7 @@ BandStatistics band_statistics(const RowSums& sums, const Weights& weights) {
       result[8 * j + 4 + c] = std::min(deviations[4 * j + c], kClip);
     }
   }
+
   normalise(result.data(), result.size());
   return result;
 }

@@ -57,6 +57,7 @@ double foreground_depth(const cv::Mat& depth, const Eigen::Vector2d& p, const Ei
   std::array<double, 2 * kMaxSide + 1> across{};  // 0 = not usable
   std::array<double, 2 * kMaxSide + 1> sorted{};
   const int side = std::min(options.side_px, kMaxSide);
+
   std::size_t count = 0;
   for (int o = -side; o <= side; ++o) {
     const auto z = static_cast<double>(depth_at(depth, p.x() + o * normal.x(), p.y() + o * normal.y()));
@@ -66,10 +67,12 @@ double foreground_depth(const cv::Mat& depth, const Eigen::Vector2d& p, const Ei
     for (; at > 0 && sorted[at - 1] > z; --at) sorted[at] = sorted[at - 1];
     sorted[at] = z;
   }
+
   // Sensors scatter single wild depths along a jump: a surface is what two samples agree on.
   std::size_t nearest = 0;
   while (nearest + 1 < count && sorted[nearest + 1] > same_surface_limit(sorted[nearest])) ++nearest;
   if (nearest + 1 >= count) return 0.0;
+
   const double low = sorted[nearest];
   const double high = same_surface_limit(low);
   const auto usable = [&](double z) { return z >= low && z <= high; };
@@ -80,6 +83,7 @@ double foreground_depth(const cv::Mat& depth, const Eigen::Vector2d& p, const Ei
     if (usable(a) && usable(b)) return 0.5 * (a + b);
     if (usable(a) || usable(b)) return usable(a) ? a : b;
   }
+
   return 0.0;
 }
 
@@ -156,15 +160,18 @@ std::optional<InverseDepth> ransac(const std::vector<Sample>& samples, const Lin
   const auto count = static_cast<std::uint32_t>(samples.size());
   const auto rounds = static_cast<std::size_t>(std::clamp(options.ransac_rounds, 0, kMostRounds));
   std::optional<InverseDepth> best;
+
   std::int64_t most = 0;
   for (std::size_t round = 0; round < rounds && most < static_cast<std::int64_t>(count); ++round) {
     // A short base extrapolates badly: the two come from different thirds or farther apart.
     const Sample& a = samples[numbers[2 * round] % count];
     const Sample& b = samples[numbers[2 * round + 1] % count];
     if (std::abs(a.s - b.s) < 0.25) continue;
+
     const double slope = (b.inverse - a.inverse) / (b.s - a.s);
     const InverseDepth line{a.inverse - slope * a.s, a.inverse + slope * (1.0 - a.s)};
     if (!plausible(line, options)) continue;
+
     const std::int64_t support = count_support(columns.s.data(), columns.inverse.data(), samples.size(), line,
                                                options.inlier_sigmas, most);
     if (support > most) {
@@ -172,6 +179,7 @@ std::optional<InverseDepth> ransac(const std::vector<Sample>& samples, const Lin
       best = line;
     }
   }
+
   return best;
 }
 
@@ -190,6 +198,7 @@ std::optional<Fit> least_squares(InverseDepth line, const std::vector<Sample>& s
     double chi2 = 0.0;
     unsigned bins = 0;
     fit.inliers = 0;
+
     for (const Sample& q : samples) {
       if (!supports(line, q, gate)) continue;
       const double sigma = inverse_sigma(line.at(q.s));
@@ -201,15 +210,18 @@ std::optional<Fit> least_squares(InverseDepth line, const std::vector<Sample>& s
       bins |= 1U << std::min(static_cast<int>(q.s * kCoverageBins), kCoverageBins - 1);
       ++fit.inliers;
     }
+
     if (fit.inliers < 3 || !(information.determinant() > 1e-9 * information.trace() * information.trace())) {
       return std::nullopt;
     }
+
     const Eigen::Vector2d solution = information.ldlt().solve(vector);
     line = {solution.x(), solution.y()};
     if (!(line.start > 0.0 && line.end > 0.0)) return std::nullopt;
     fit.covariance = information.inverse() * std::max(1.0, chi2 / (fit.inliers - 2));
     fit.bins = __builtin_popcount(bins);
   }
+
   fit.line = line;
   return fit;
 }
@@ -263,8 +275,10 @@ std::optional<Line3> fit_line_depth(const LineSegment& segment, const cv::Mat& d
       coverage < options.min_coverage) {
     return std::nullopt;
   }
+
   line.inlier_share = static_cast<float>(inlier_share);
   line.coverage = static_cast<float>(coverage);
+
   const Eigen::Vector3d start_ray = ray_of(segment.start, camera);
   const Eigen::Vector3d end_ray = ray_of(segment.end, camera);
   line.start = start_ray / fit->line.start;

@@ -45,6 +45,7 @@ std::vector<cv::Vec4f> run(const LineDetectorOptions& options, const cv::Mat& im
     case LineMethod::kLsd:
       lines = detect_lsd(image, min_length, static_cast<float>(options.min_gradient), options.exact_nfa);
       break;
+
     case LineMethod::kEdlines: {
       auto drawing = cv::ximgproc::createEdgeDrawing();
       drawing->params.EdgeDetectionOperator = cv::ximgproc::EdgeDrawing::SOBEL;
@@ -55,11 +56,13 @@ std::vector<cv::Vec4f> run(const LineDetectorOptions& options, const cv::Mat& im
       drawing->detectLines(lines);
       break;
     }
+
     case LineMethod::kFld:
       cv::ximgproc::createFastLineDetector(static_cast<int>(min_length), 1.414F, 30.0, 60.0, 3, false)
           ->detect(image, lines);
       break;
   }
+
   return lines;
 }
 
@@ -105,6 +108,7 @@ std::vector<LineSegment> LineDetector::detect(const cv::Mat& gray) const {
   CV_Assert(gray.type() == CV_8UC1);
   const cv::Rect region = valid_region(gray);
   const bool half = options_.scale == LineScale::kHalf;
+
   // A pixel of the half image is centred between four pixels: full = 2 half + 0.5.
   const float factor = half ? 2.0F : 1.0F;
   const float shift = half ? 0.5F : 0.0F;
@@ -122,6 +126,7 @@ std::vector<LineSegment> LineDetector::detect(const cv::Mat& gray) const {
     orient(s, gray);
     if (s.response >= kMinResponse) segments.push_back(s);
   }
+
   if (options_.join) segments = join_collinear(std::move(segments), options_);
 
   std::vector<LineSegment> kept;
@@ -131,10 +136,12 @@ std::vector<LineSegment> LineDetector::detect(const cv::Mat& gray) const {
     orient(s, gray);
     if (s.response >= kMinResponse && s.length() >= min_length) kept.push_back(s);
   }
+
   sort_segments(kept);
   if (options_.max_count > 0 && kept.size() > static_cast<std::size_t>(options_.max_count)) {
     kept.resize(static_cast<std::size_t>(options_.max_count));
   }
+
   return kept;
 }
 

@@ -95,15 +95,18 @@ LineSegment merged(const LineSegment& a, const LineSegment& b) {
     const Eigen::Vector2f h = s->end - s->start;
     scatter += s->length() * (m * m.transpose() + h * h.transpose() / 12.0F);
   }
+
   const float angle = 0.5F * std::atan2(2.0F * scatter(0, 1), scatter(0, 0) - scatter(1, 1));
   Eigen::Vector2f d(std::cos(angle), std::sin(angle));
   if (d.dot(a.end - a.start) < 0.0F) d = -d;
+
   float low = 0.0F;
   float high = 0.0F;
   for (const Eigen::Vector2f& p : {a.start, a.end, b.start, b.end}) {
     low = std::min(low, d.dot(p - centre));
     high = std::max(high, d.dot(p - centre));
   }
+
   LineSegment result;
   result.start = centre + low * d;
   result.end = centre + high * d;
@@ -122,10 +125,12 @@ std::vector<LineSegment> join_collinear(std::vector<LineSegment> segments,
   std::vector<Piece> pieces;
   pieces.reserve(segments.size());
   for (const LineSegment& s : segments) pieces.emplace_back(s);
+
   // Longest lines grow first, each by its first fitting partner, until nothing fits any more.
   constexpr std::size_t kAtATime = 32;
   Glance glance(pieces);
   std::vector<char> gone(pieces.size(), 0);
+
   const auto partner_of = [&](std::size_t i) {
     for (std::size_t first = 0; first < pieces.size(); first += kAtATime) {
       const std::size_t last = std::min(pieces.size(), first + kAtATime);
@@ -136,6 +141,7 @@ std::vector<LineSegment> join_collinear(std::vector<LineSegment> segments,
     }
     return pieces.size();
   };
+
   for (std::size_t i = 0; i < pieces.size(); ++i) {
     if (gone[i] != 0) continue;
     // Pieces that did not fit the shorter line may fit the joined one: search from the start again.
@@ -146,10 +152,12 @@ std::vector<LineSegment> join_collinear(std::vector<LineSegment> segments,
       gone[j] = 1;
     }
   }
+
   segments.clear();
   for (std::size_t i = 0; i < pieces.size(); ++i) {
     if (gone[i] == 0) segments.push_back(pieces[i].segment);
   }
+
   sort_segments(segments);
   return segments;
 }

@@ -91,10 +91,12 @@ Lsd::Lsd(const cv::Mat& image, float min_gradient, bool exact)
   usable.reserve(gradients_.size() / 3);
   bins.reserve(gradients_.size() / 3);
   std::array<int, kBins + 1> first{};
+
   // The outermost pixels are never free: regions need no bounds checks.
   for (int y = 1; y + 1 < height_; ++y) {
     const unsigned char* p = image.ptr<unsigned char>(y);
     const unsigned char* q = image.ptr<unsigned char>(y + 1);
+
     for (int x = 1; x + 1 < width_; ++x) {
       const int a = q[x + 1] - p[x];
       const int b = p[x + 1] - q[x];
@@ -102,24 +104,29 @@ Lsd::Lsd(const cv::Mat& image, float min_gradient, bool exact)
       const int gy = a - b;
       const int squared = gx * gx + gy * gy;
       if (squared < least_squared) continue;
+
       const int index = y * width_ + x;
       const float norm = std::sqrt(static_cast<float>(squared));
       gradients_[static_cast<std::size_t>(index)] = {static_cast<float>(gx) / norm,
                                                      static_cast<float>(gy) / norm, 0.5F * norm};
+
       const int bin = kBins - 1 - std::min(kBins - 1, static_cast<int>(0.5F * kBinsPerLevel * norm));
       usable.push_back(index);
       bins.push_back(bin);
       ++first[static_cast<std::size_t>(bin) + 1];
     }
   }
+
   for (std::size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
   // In front of a white wall the faint edges are all there is, in a busy scene they only cost: whole bins are
   // taken, strongest first, until the share is reached, but strong ones always.
   const auto strong = static_cast<std::size_t>(kBins - static_cast<int>(kStrongGradient * kBinsPerLevel));
+
   const auto enough = static_cast<int>(kWeakShare * width_ * height_);
   std::size_t last = strong;
   while (last < kBins && first[last + 1] <= enough) ++last;
   seeds_.resize(static_cast<std::size_t>(first[last]));
+
   for (std::size_t i = 0; i < usable.size(); ++i) {
     const auto bin = static_cast<std::size_t>(bins[i]);
     if (bin >= last) continue;
@@ -134,6 +141,7 @@ void Lsd::grow(int seed, float cosine) {
     int index;
     float x, y;
   };
+
   const std::array<Step, 8> around = {{{-width_ - 1, -1.0F, -1.0F},
                                        {-width_, 0.0F, -1.0F},
                                        {-width_ + 1, 1.0F, -1.0F},
@@ -142,14 +150,17 @@ void Lsd::grow(int seed, float cosine) {
                                        {width_ - 1, -1.0F, 1.0F},
                                        {width_, 0.0F, 1.0F},
                                        {width_ + 1, 1.0F, 1.0F}}};
+
   region_.assign(1, pixel(seed));
   free_[static_cast<std::size_t>(seed)] = {};
   float sx = gradients_[static_cast<std::size_t>(seed)].x;
   float sy = gradients_[static_cast<std::size_t>(seed)].y;
   float limit = cosine;  // cos(tolerance) |sum|
   Direction* const free = free_.data();
+
   for (std::size_t i = 0; i < region_.size(); ++i) {
     const Pixel from = region_[i];
+
     for (const Step& step : around) {
       const int index = from.index + step.index;
       const Direction g = free[index];
@@ -161,6 +172,7 @@ void Lsd::grow(int seed, float cosine) {
       limit = cosine * std::sqrt(sx * sx + sy * sy);
     }
   }
+
   sum_ = {sx, sy};
 }
 
@@ -174,9 +186,11 @@ Rectangle Lsd::fit() const {
     weight += g;
     centre += g * i.position();
   }
+
   centre /= weight;
   float xx = 0.0F;
   float yy = 0.0F;
+
   float xy = 0.0F;
   for (const Pixel& i : region_) {
     const float g = gradients_[static_cast<std::size_t>(i.index)].magnitude;
@@ -185,12 +199,14 @@ Rectangle Lsd::fit() const {
     yy += g * p.y() * p.y();
     xy += g * p.x() * p.y();
   }
+
   const float angle = 0.5F * std::atan2(2.0F * xy, xx - yy);
   Eigen::Vector2f d(std::cos(angle), std::sin(angle));
   if (d.x() * sum_.y() - d.y() * sum_.x() > 0.0F) d = -d;  // darker side on the right
   float low = 0.0F;
   float high = 0.0F;
   float left = 0.0F;
+
   float right = 0.0F;
   for (const Pixel& i : region_) {
     const Eigen::Vector2f p = i.position() - centre;
@@ -201,6 +217,7 @@ Rectangle Lsd::fit() const {
     left = std::min(left, across);
     right = std::max(right, across);
   }
+
   Rectangle r;
   r.start = centre + low * d;
   r.end = centre + high * d;
@@ -232,12 +249,15 @@ bool Lsd::make_dense(Rectangle& rectangle) {
   if (density(rectangle) >= kDensity) return true;
   const Pixel seed = region_.front();
   const float tolerance = tolerance_near_seed(rectangle.width);
+
   for (const Pixel& i : region_) give_back(i.index);
   grow(seed.index, std::cos(tolerance));
   if (region_.size() < 3) return false;
+
   rectangle = fit();
   const Eigen::Vector2f middle = seed.position();
   float radius = std::max((rectangle.start - middle).norm(), (rectangle.end - middle).norm());
+
   while (density(rectangle) < kDensity) {
     radius *= kRadiusStep;
     const auto inside = [&](const Pixel& i) {
@@ -249,6 +269,7 @@ bool Lsd::make_dense(Rectangle& rectangle) {
     if (region_.size() < 3) return false;
     rectangle = fit();
   }
+
   return true;
 }
 

@@ -57,9 +57,11 @@ std::vector<LineMatch> match_lines(const std::vector<LineFeature>& a, const std:
     const auto [shorter, longer] = std::minmax(one.length, other.length);
     return one.direction.dot(other.direction) >= min_cosine && shorter >= min_ratio * longer;
   };
+
   const std::vector<Shape> shapes_a = shapes(a);
   const std::vector<Shape> shapes_b = shapes(b);
   std::vector<Best> best_a(a.size());
+
   std::vector<Best> best_b(b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
     for (std::size_t j = 0; j < b.size(); ++j) {
@@ -69,6 +71,7 @@ std::vector<LineMatch> match_lines(const std::vector<LineFeature>& a, const std:
       best_b[j].offer(static_cast<int>(i), distance);
     }
   }
+
   std::vector<LineMatch> matches;
   for (std::size_t i = 0; i < a.size(); ++i) {
     const Best& best = best_a[i];
@@ -77,6 +80,7 @@ std::vector<LineMatch> match_lines(const std::vector<LineFeature>& a, const std:
     if (best_b[static_cast<std::size_t>(best.index)].index != static_cast<int>(i)) continue;
     matches.push_back({static_cast<int>(i), best.index, best.first});
   }
+
   return matches;
 }
 

@@ -62,6 +62,7 @@ void orient(LineSegment& segment, const cv::Mat& gray) {
 void refine(LineSegment& segment, const cv::Mat& gray) {
   static const std::array<float, 2 * kProfileReach> weights = window_weights();
   const int n = samples_along(segment.length());
+
   for (int pass = 0; pass < 2; ++pass) {
     const Eigen::Vector2f normal = right_of(segment.direction());
     OffsetFit fit;
@@ -72,6 +73,7 @@ void refine(LineSegment& segment, const cv::Mat& gray) {
       float before = bilinear(gray, q.x(), q.y());
       float total = 0.0F;
       float sum = 0.0F;
+
       float moment = 0.0F;
       for (int i = 0; i < 2 * kProfileReach; ++i) {
         q += normal;
@@ -79,6 +81,7 @@ void refine(LineSegment& segment, const cv::Mat& gray) {
         // Only steps from bright (left) to dark (right) belong to this line. Walls darken towards their
         // corners, on one side of an edge: squared, these small steps hardly pull.
         const float step = std::max(0.0F, before - after);
+
         const float windowed = weights[static_cast<std::size_t>(i)] * step;
         const float w = windowed * step;
         total += windowed;
@@ -86,9 +89,11 @@ void refine(LineSegment& segment, const cv::Mat& gray) {
         moment += w * (static_cast<float>(i - kProfileReach) + 0.5F);
         before = after;
       }
+
       // Saturating weight: one strong spot must not outvote the rest of the line.
       if (total > 0.5F) fit.add(2.0F * s - 1.0F, moment / sum, std::min(total, 20.0F));
     }
+
     float a = 0.0F;
     float b = 0.0F;
     if (!fit.solve(a, b) || std::abs(a) + std::abs(b) > static_cast<float>(kProfileReach)) return;

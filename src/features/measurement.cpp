@@ -95,6 +95,7 @@ void recalibrate(FrameFeatures& features, const sensor::Recalibration& change, c
       const double towards = velocity(2) + velocity(3) * p.y() - velocity(4) * p.x();
       *end = p * (1.0 - change.delay_s() * towards / p.z());
     };
+
     move_end(line.segment.start, line.line3 ? &line.line3->start : nullptr);
     move_end(line.segment.end, line.line3 ? &line.line3->end : nullptr);
   }

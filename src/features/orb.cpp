@@ -75,9 +75,11 @@ std::vector<Corner> spread(std::vector<Corner> corners, const cv::Size& size, in
     corners.resize(std::min(count, corners.size()));
     return corners;
   }
+
   const Cells cells(size.width, size.height);
   std::vector<std::size_t> begin(cells.count() + 1, 0);
   for (const Corner& corner : corners) ++begin[cells.of(corner) + 1];
+
   for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
   std::vector<Corner> by_cell(corners.size());
   std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
@@ -88,6 +90,7 @@ std::vector<Corner> spread(std::vector<Corner> corners, const cv::Size& size, in
 
   std::vector<Corner> chosen;
   chosen.reserve(count);
+
   std::vector<Corner> round;
   for (std::size_t rank = 0; chosen.size() < count; ++rank) {
     round.clear();
@@ -95,13 +98,16 @@ std::vector<Corner> spread(std::vector<Corner> corners, const cv::Size& size, in
       if (begin[i] + rank < begin[i + 1]) round.push_back(by_cell[begin[i] + rank]);
     }
     if (round.empty()) break;
+
     const std::size_t room = count - chosen.size();
     if (round.size() > room) {
       std::sort(round.begin(), round.end(), stronger);
       round.resize(room);
     }
+
     chosen.insert(chosen.end(), round.begin(), round.end());
   }
+
   return chosen;
 }
 
@@ -111,11 +117,13 @@ bool on_edge(const cv::Mat& level, int x, int y, double min_corner) {
   constexpr int kTensorReach = 3;
   int xx = 0;
   int xy = 0;
+
   int yy = 0;
   for (int v = y - kTensorReach; v <= y + kTensorReach; ++v) {
     const unsigned char* above = level.ptr<unsigned char>(v - 1);
     const unsigned char* row = level.ptr<unsigned char>(v);
     const unsigned char* below = level.ptr<unsigned char>(v + 1);
+
     for (int u = x - kTensorReach; u <= x + kTensorReach; ++u) {
       const int dx = row[u + 1] - row[u - 1];
       const int dy = below[u] - above[u];
@@ -124,6 +132,7 @@ bool on_edge(const cv::Mat& level, int x, int y, double min_corner) {
       yy += dy * dy;
     }
   }
+
   const double sum = static_cast<double>(xx) + yy;  // of the tensor's eigenvalues
   const double apart = static_cast<double>(xx) - yy;
   const double squared = apart * apart + 4.0 * xy * xy;  // of their difference
@@ -235,6 +244,7 @@ OrbFeatures OrbExtractor::extract(const cv::Mat& gray, const cv::Rect& region) c
   double share_sum = 0.0;
   for (float s : scale_) share_sum += 1.0 / s;
   cv::Mat image = gray;  // of the level
+
   for (int level = 0; level < options_.levels; ++level) {
     const float scale = scale_[static_cast<std::size_t>(level)];
     if (level > 0) {
@@ -245,15 +255,18 @@ OrbFeatures OrbExtractor::extract(const cv::Mat& gray, const cv::Rect& region) c
       cv::resize(image, smaller, size, 0, 0, cv::INTER_LINEAR);
       image = smaller;
     }
+
     result.levels.push_back(image);
     const cv::Rect inner = inner_region(region, image.size(), scale);
     if (inner.width < 8 || inner.height < 8) continue;
+
     const int wanted = static_cast<int>(std::lround(options_.count / (scale * share_sum)));
     const std::vector<Corner> corners =
         spread(detect(image, inner, options_.fast_threshold,
                       std::min(options_.fast_threshold, options_.fast_threshold_min), options_.min_corner),
                image.size(), wanted, options_.spread);
     if (corners.empty()) continue;
+
     std::vector<cv::KeyPoint> on_level;
     for (const Corner& c : corners) {
       const float angle = orb_orientation(image, c.x, c.y);
@@ -262,9 +275,11 @@ OrbFeatures OrbExtractor::extract(const cv::Mat& gray, const cv::Rect& region) c
       result.patches.push_back(cut_patch(image, c.x, c.y, pixel));
       on_level.emplace_back(static_cast<float>(c.x), static_cast<float>(c.y), 31.0F, angle);
     }
+
     const std::vector<Descriptor256> descriptors = describe(image, on_level);
     result.descriptors.insert(result.descriptors.end(), descriptors.begin(), descriptors.end());
   }
+
   return result;
 }
 

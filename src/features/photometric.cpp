@@ -30,9 +30,11 @@ struct Surroundings {
 float continuous_depth(const cv::Mat& depth, int x, int y, const Surroundings& around) {
   const float here = depth.at<float>(y, x);
   if (!(here > kNearestSample_m)) return 0.0F;
+
   const float tolerance = 0.02F + 6.0F * static_cast<float>(sensor::depth_sigma(here)) / here;
   const int near = around.near_px, far = around.far_px;
   float sum = 1.0F / here;
+
   int count = 1;
   for (const int r : {near / 2, near, (near + far) / 2, far}) {
     for (const auto& [dx, dy] : {std::pair{1, 0}, {0, 1}, {1, 1}, {1, -1}}) {
@@ -42,6 +44,7 @@ float continuous_depth(const cv::Mat& depth, int x, int y, const Surroundings& a
         if (r > near) continue;
         return 0.0F;
       }
+
       const float a = depth.at<float>(ya, xa), b = depth.at<float>(yb, xb);
       // On a plane inverse depth on opposite sides has its mean in the middle.
       if (!(a > 0.0F) || !(b > 0.0F) || std::abs(0.5F * (here / a + here / b) - 1.0F) > tolerance)
@@ -51,6 +54,7 @@ float continuous_depth(const cv::Mat& depth, int x, int y, const Surroundings& a
       count += 2;
     }
   }
+
   return static_cast<float>(count) / sum;
 }
 
@@ -123,6 +127,7 @@ std::vector<PhotometricSample> sample_level(const cv::Mat& image, std::size_t le
   const float per_y = static_cast<float>(depth.rows) / static_cast<float>(image.rows);
   const Surroundings around{static_cast<int>(2.5F * per_x + 0.5F), static_cast<int>(kHalo * per_x + 0.5F)};
   const int cell = kCell[level];
+
   const Eigen::Matrix3f rotation = camera_from_depth.rotation.cast<float>();
   const Eigen::Vector3f translation = camera_from_depth.translation.cast<float>();
   for (int cy = kBorder; cy + cell <= image.rows - kBorder; cy += cell) {
@@ -132,14 +137,17 @@ std::vector<PhotometricSample> sample_level(const cv::Mat& image, std::size_t le
       const int full_y = static_cast<int>((static_cast<float>(best.y) + 0.5F) * per_y);
       const float z = continuous_depth(depth, full_x, full_y, around);
       if (!(z > 0.0F)) continue;
+
       const Eigen::Vector3f in_depth = camera.unproject(full_x, full_y, static_cast<double>(z)).cast<float>();
       const auto sample = sample_at(image, small, rotation * in_depth + translation);
       if (!sample) continue;
+
       samples.push_back(*sample);
       roughness.push_back(
           depth_roughness(depth, full_x, full_y, around.near_px, static_cast<int>(level) + 1));
     }
   }
+
   keep_smooth(roughness, samples);
   return samples;
 }

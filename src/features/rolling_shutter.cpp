@@ -25,9 +25,11 @@ void undo_rolling_shutter(FrameFeatures& features, const sensor::Pinhole& camera
     const double share = static_cast<double>(v) / camera.height - 0.5;
     return RowMotion(motion, -share, has_depth)(from);
   };
+
   const auto ray = [&](const Eigen::Vector2f& pixel, double z) -> Eigen::Vector3d {
     return camera.unproject(static_cast<double>(pixel.x()), static_cast<double>(pixel.y()), z);
   };
+
   for (PointFeature& point : features.points) {
     const bool has_depth = point.depth > 0.0F;
     const double z = has_depth ? static_cast<double>(point.depth) : 1.0;
@@ -35,6 +37,7 @@ void undo_rolling_shutter(FrameFeatures& features, const sensor::Pinhole& camera
     point.pixel = camera.project(p).cast<float>();
     if (has_depth) point.depth = static_cast<float>(p.z());
   }
+
   for (LineFeature& line : features.lines) {
     const auto move_end = [&](Eigen::Vector2f& pixel, Eigen::Vector3d* end) {
       const float v = pixel.y();
@@ -45,6 +48,7 @@ void undo_rolling_shutter(FrameFeatures& features, const sensor::Pinhole& camera
     move_end(line.segment.start, line.line3 ? &line.line3->start : nullptr);
     move_end(line.segment.end, line.line3 ? &line.line3->end : nullptr);
   }
+
   features.grid = PointGrid(features.points, camera.width, camera.height);
 }
 

@@ -80,6 +80,7 @@ class RunViews {
                         {},
                         0.0});
     }
+
     static const ObservationNoise noise;
     for (const core::PointId id : run_.map->point_ids()) {
       for (const maps::Observation& o : run_.map->point(id).observations) {
@@ -102,6 +103,7 @@ class RunViews {
       const bool is_keyframe = run_.map->keyframe(frame.reference).stamp == frame.stamp;
       if (!is_keyframe) frames.push_back(&frame);
     }
+
     for (const maps::FramePose* chosen : thinned(frames, most)) {
       const maps::FramePose& frame = *chosen;
       View view{frame.stamp,
@@ -110,11 +112,13 @@ class RunViews {
                 {},
                 0.0};
       view.late_s = model_.camera().depth_delay_s - frame.seen->depth_delay_s;
+
       for (const maps::SeenPoint& s : frame.seen->points) {
         if (run_.map->find(s.point) == nullptr) continue;
         view.seen.emplace_back(s.point, observation_of({s.pixel.cast<double>(), static_cast<double>(s.depth)},
                                                        static_cast<double>(s.sigma_px)));
       }
+
       views_.push_back(std::move(view));
     }
   }
@@ -151,8 +155,10 @@ void add_stretch(const CalibrationRun& run, const geometry::Trajectory& path, co
     optimize::CalibrationPose pose;
     pose.camera_from_world = view->camera_from_world;
     pose.velocity = geometry::velocity_at(path, view->stamp);
+
     // The relative poses of components are unknown: one pose of each is held.
     pose.fixed = view == begin || view->root != (view - 1)->root;
+
     for (const auto& [id, observation] : view->seen) {
       by_point[id].push_back(observation);
       CalibrationObservation& seen = by_point[id].back();
@@ -160,8 +166,10 @@ void add_stretch(const CalibrationRun& run, const geometry::Trajectory& path, co
       seen.depth_rate = depth_rate(run.map->point(id), pose);
       if (seen.depth > 0.0) seen.depth -= view->late_s * seen.depth_rate;
     }
+
     part.poses.push_back(pose);
   }
+
   for (auto& [id, seen] : by_point) {
     if (static_cast<int>(seen.size()) < kLeastViews) continue;
     for (CalibrationObservation& o : seen) o.point = static_cast<int>(part.points.size());
@@ -260,12 +268,14 @@ class Calibrator {
     Trial best = earlier.empty() ? before : try_out(evidence, believed);
     bool news = !earlier.empty() && is_believed(before, best, earlier, options_.earlier_least_gain);
     result.findings.clear();
+
     for (const CameraNumber& n : numbers_of(given_)) result.findings.push_back({n.name, n.value, n.value});
     std::size_t in_vain = 0;  // tried since something was believed
     for (std::size_t g = 0; in_vain < groups().size(); g = (g + 1) % groups().size()) {
       ++in_vain;
       const Group& group = groups()[g];
       if (believed[group.front()]) continue;
+
       FreeUnknowns free = believed;
       for (const CameraUnknown u : group) free[u] = true;
       const Trial trial = try_out(evidence, free);
@@ -274,20 +284,24 @@ class Calibrator {
       const double gain = (best.cost() - trial.cost()) / before.cost();
       note(group, found, trial.sigma(), gain, used, result.findings);
       if (!used) continue;
+
       believed = free;
       best = trial;
       news = true;
       in_vain = 0;
     }
+
     if (!news) {
       believed = {};
       best = before;
     }
+
     result.gain = 1.0 - best.cost() / before.cost();
     const CameraChange change = most_likely(evidence, believed, prior_);
     for (const Group& group : groups()) {  // report the final values of all
       if (believed[group.front()]) note(group, change, best.sigma(), {}, true, result.findings);
     }
+
     return change;
   }
 
@@ -369,6 +383,7 @@ core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRu
   for (CalibrationProblem& part : parts) part.camera = given;
   std::size_t keyframes = 0;
   for (const CalibrationRun& run : runs) keyframes += run.map->keyframe_count();
+
   for (const CalibrationRun& run : runs)
     add_run(run, options.views / static_cast<int>(runs.size()), given, parts);
   CameraCalibration result;
@@ -376,8 +391,10 @@ core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRu
     result.views += static_cast<int>(part.poses.size());
     result.observations += static_cast<int>(part.observations.size());
   }
+
   const Calibrator calibrator(given, options);
   CameraChange change = nothing(given);
+
   for (int round = 0; round < kRounds; ++round) {
     const auto evidence = evidence_of(parts, change, executor);
     const bool few = keyframes < kLeastKeyframes && result.views < kLeastViewsInAll;
@@ -387,9 +404,11 @@ core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRu
                       "film a place with texture for 10 s or more while turning and moving the camera",
                       result.views, result.observations));
     }
+
     const CameraChange before = std::exchange(change, calibrator.choose(*evidence, result));
     if (calibrator.same(before, change)) break;
   }
+
   result.camera = optimize::changed_camera(given, change);
   return result;
 }

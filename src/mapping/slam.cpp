@@ -107,10 +107,12 @@ Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32
       joiner_(camera, executor) {
   camera_.color = camera;
   if (!options.loops.enabled) return;
+
   constexpr std::size_t kLookAlikes = 12;
   tracker_.set_place_finder([this](const features::FrameFeatures& picture) {
     return closer_.look_alikes(map_, picture, kLookAlikes);
   });
+
   tracker_.set_place_judge([this](const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
                                   core::KeyframeId keyframe, const Rigid3& found_at) {
     const LostAt lost{tracker_.reference(), tracker_.camera_from_world(), tracker_.astray()};
@@ -118,10 +120,12 @@ Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32
     // place is no evidence there. A component that begins in its place is joined by the evidence of several
     // keyframes.
     const bool stayed = is_near(found_at, lost.camera_from_world, 0.15, 0.15);
+
     if (options_.components && !stayed && tracker_.lost_frames() >= kLostFrames &&
         can_begin_component(frame, features)) {
       return false;
     }
+
     return relocalisation_.passes(map_, lost, frame, features, keyframe, found_at);
   });
 }
@@ -141,10 +145,12 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& featur
   const bool tracked = last_track_.state == tracking::TrackState::kTracked;
   if (!believed || (tracked && !is_well_held(last_track_))) last_track_.state = tracking::TrackState::kLost;
   const tracking::TrackResult& track = last_track_;
+
   if (tracker_.astray()) {
     const auto place = closer_.locate(frame, features, options_.mapper.surface);
     if (place) last_track_ = tracker_.begin_at(*place, frame, features);
   }
+
   FrameReport report = FrameReport::of(frame, track);
   report.bundle = bundle;
   if (options_.components && tracker_.lost_frames() >= kLostFrames && can_begin_component(frame, *features)) {
@@ -160,6 +166,7 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& featur
 
   // Sections 3.3 and 4.1: what the frame adds to the map.
   maps::FramePose pose = frames_.measured(map_, frame.stamp, track);
+
   if (pose.tracked) {
     pose.seen = seen_points();
     mapper_.count_observations(map_, track);            // the share of keyframes that find a landmark
@@ -193,11 +200,13 @@ bool Slam::believes_place(const sensor::RgbdFrame& frame, const Features& featur
   const int lost_frames = probation_->lost_before + probation_->frames;
   bool stands = track.state == tracking::TrackState::kTracked;
   if (stands && probation_->frames < kFrames) return false;
+
   if (stands) {
     const LostAt lost{tracker_.reference(), tracker_.camera_from_world(), true};
     stands =
         relocalisation_.passes(map_, lost, frame, *features, tracker_.reference(), track.camera_from_world);
   }
+
   probation_.reset();
   last_track_.relocalised = stands;
   found_again_ = found_again_ || stands;
@@ -337,12 +346,14 @@ bool Slam::give_way() {
                     maps::root_of(map_, loop.query) == maps::root_of(map_, first);
            });
   };
+
   const auto found = std::find_if(relocalised_.rbegin(), relocalised_.rend(), lies_between);
   if (found == relocalised_.rend()) return false;
 
   // The loops join the two parts again.
   commit_bundles();
   maps::split_component(map_, *found);
+
   joiner_.add(map_, dispute.loops);
   relocalised_.erase(std::next(found).base());
   closer_.remove_dispute();
@@ -364,6 +375,7 @@ void Slam::join_components(core::KeyframeId keyframe) {
   maps::Map map = map_;
   const std::size_t joining = maps::component(map, overlap->b).keyframe_count();
   maps::move_component(map, overlap->b, overlap->evidence.alignment.a_from_b);
+
   std::vector<PoseEdge> edges;
   const VerifiedPair* best = nullptr;
   const auto share = [](const VerifiedPair& pair) { return pair.evidence.points + 2 * pair.evidence.lines; };
@@ -372,6 +384,7 @@ void Slam::join_components(core::KeyframeId keyframe) {
         {pair.match, pair.query, pair.evidence.query_from_match, pair.evidence.information, false});
     if (best == nullptr || share(pair) > share(*best)) best = &pair;
   }
+
   const bool query_in_a = maps::root_of(map, best->query) == overlap->a;
   map.set_parent(overlap->b, query_in_a ? best->query : best->match);
   if (!closer_.close(map, edges)) return;
@@ -428,10 +441,12 @@ std::shared_ptr<const maps::SeenPoints> Slam::seen_points() const {
   constexpr std::size_t kMost = 150;
   const tracking::TrackResult& track = last_track_;
   if (track.features == nullptr || track.points.empty()) return nullptr;
+
   const sensor::ImageModel model(image_, camera_);
   const ObservationNoise noise = noise_of(options_);
   auto seen = std::make_shared<maps::SeenPoints>();
   seen->depth_delay_s = camera_.depth_delay_s;
+
   const auto keep = [&](const tracking::PointMatch& m, const Eigen::Vector2f& shift) {
     const features::PointFeature& f = track.features->points[static_cast<std::size_t>(m.feature)];
     const Eigen::Vector2f pixel = f.pixel + shift;
@@ -441,6 +456,7 @@ std::shared_ptr<const maps::SeenPoints> Slam::seen_points() const {
     seen->points.push_back({m.point, measured.pixel.cast<float>(), static_cast<float>(measured.depth),
                             static_cast<float>(noise.of(f, m.aligned).pixel_sigma)});
   };
+
   const std::size_t all = track.points.size() + track.doubtful.size();
   const std::size_t count = std::min(kMost, all);
   for (std::size_t i = 0; i < count; ++i) {
@@ -451,6 +467,7 @@ std::shared_ptr<const maps::SeenPoints> Slam::seen_points() const {
       keep(track.doubtful[n - track.points.size()], track.doubtful[n - track.points.size()].shift);
     }
   }
+
   return seen;
 }
 

@@ -135,24 +135,29 @@ void read_depth_camera(const ConfigNode& root, Camera& camera, ConfigProblems& p
   const ConfigNode* transform = root.find("color_from_depth");
   const ConfigNode* depth = root.find("depth");
   if (transform != nullptr) read_color_from_depth(*transform, camera, problems);
+
   if (transform != nullptr && depth == nullptr) {
     problems.push_back(
         {transform->mark, "depth",
          "is missing: color_from_depth needs the depth camera's own width height fx fy cx cy"});
   }
   if (depth == nullptr) return;
+
   if (transform == nullptr) {
     problems.push_back({depth->mark, "color_from_depth",
                         "is missing: a separate depth camera needs its pose (4x4, metres)"});
   }
+
   if (depth->kind != ConfigNode::Kind::kMap) {
     problems.push_back({depth->mark, "depth", "must hold the keys width height fx fy cx cy"});
     return;
   }
+
   Pinhole pinhole;
   LensKeys lens;
   core::OptionTable table;
   declare_pinhole(table, pinhole);
+
   lens.declare(table);
   table.set_all(*depth, "depth", problems);
   check_pinhole(*depth, pinhole, "depth", problems);
@@ -205,9 +210,11 @@ core::Result<Camera> camera_in(core::Result<ConfigNode> root, const std::filesys
   lens.declare(table);
   table.number("depth_scale", camera.depth_scale, {1e-3, 1e7}, "", "Raw depth units per metre");
   table.number("fps", camera.fps, {1e-3, 1e4}, "", "Pairs a second");
+
   double readout_s = 0.0;
   table.number("readout", readout_s, {0.0, 0.1}, "s",
                "Time from the first to the last row of an image; 0: all at once");
+
   std::vector<double> slope(2, 0.0);
   table.numbers("depth_slope", slope, 2, {-0.2, 0.2}, "1/m",
                 "Slope along x and y: added to 1 / depth on the ray (x, y, 1)");
@@ -243,30 +250,36 @@ std::string to_yaml(const Camera& camera) {
   text += fmt::format("model: {}\n", model_name(camera.model)) + pinhole_yaml(camera.color, "");
   text += lens_yaml(camera.lens(), "");
   text += fmt::format("depth_scale: {}  # raw units per metre\nfps: {}\n", camera.depth_scale, camera.fps);
+
   if (camera.readout_s) {
     text += fmt::format("readout: {}  # s from the first row of an image to the last; 0: all at once\n",
                         *camera.readout_s);
   }
+
   if (camera.depth_slope != std::array<double, 2>{}) {
     text += fmt::format("depth_slope: [{}, {}]  # 1/m along x, y: added to 1 / depth on the ray (x, y, 1)\n",
                         camera.depth_slope[0], camera.depth_slope[1]);
   }
+
   if (camera.depth_delay_s != 0.0) {
     text += fmt::format("depth_delay: {}  # s that depth images were taken later than their stamps say\n",
                         camera.depth_delay_s);
   }
+
   if (camera.color_from_depth && camera.depth) {
     const Eigen::Matrix4d m = camera.color_from_depth->isometry().matrix();
     text += "color_from_depth:\n";
     for (int r = 0; r < 4; ++r) {
       text += fmt::format("  - [{}, {}, {}, {}]\n", m(r, 0), m(r, 1), m(r, 2), m(r, 3));
     }
+
     text += "depth:\n" + pinhole_yaml(*camera.depth, "  ");
     if (camera.depth_lens.distorts()) {
       text += fmt::format("  model: {}\n", model_name(camera.depth_lens.model));
       text += lens_yaml(camera.depth_lens, "  ");
     }
   }
+
   return text;
 }
 

@@ -221,16 +221,19 @@ cv::Mat Rectifier::Maps::registered(const cv::Mat& raw) const {
   const Pinhole& c = target;
   const bool coarse = c.fx > kCoarse * camera.depth->fx;
   const auto scale = static_cast<float>(camera.depth_scale);
+
   cv::Mat out = cv::Mat::zeros(c.height, c.width, CV_32FC1);
   for (int v = 0; v < raw.rows; ++v) {
     const auto* from = raw.ptr<std::uint16_t>(v);
     for (int u = 0; u < raw.cols; ++u) {
       const double z_depth = static_cast<double>(metres(from[u], scale));
       if (z_depth <= 0.0) continue;
+
       Eigen::Vector2d half;
       const Eigen::Vector3d ray = ray_of(u, v, half);
       const Eigen::Vector3d p = *camera.color_from_depth * (z_depth * ray);
       if (p.z() <= 1e-3 || half.x() == 0.0) continue;
+
       const Eigen::Vector2d focal(c.fx, c.fy);
       DepthPatch patch;
       patch.centre = c.project(p);
@@ -240,6 +243,7 @@ cv::Mat Rectifier::Maps::registered(const cv::Mat& raw) const {
       patch.paint(out);
     }
   }
+
   return out;
 }
 

@@ -28,18 +28,23 @@ std::optional<Sight> sight_of(const maps::Map& map, const maps::Observation& see
   const maps::Keyframe& keyframe = map.keyframe(seen.keyframe);
   const auto feature = static_cast<std::size_t>(seen.feature);
   if (keyframe.features == nullptr || feature >= keyframe.features->patches.size()) return std::nullopt;
+
   const geometry::Rigid3& there_from_world = map.camera_from_world(seen.keyframe);
   const Eigen::Vector3d here = camera_from_world * position;
   const Eigen::Vector3d there = there_from_world * position;
   if (there.z() < kNearest_m) return std::nullopt;
+
   const geometry::Rigid3 here_from_there = camera_from_world * there_from_world.inverse();
   if ((here_from_there.rotation * there).dot(here) < kLeastCosine * there.norm() * here.norm())
     return std::nullopt;
+
   Sight sight;
   sight.farther = std::log(here.norm() / there.norm()) / log_scale;
   if (std::abs(sight.farther) > kMostOctaves) return std::nullopt;
+
   // Its surface there, or a plane across the line of sight, seen from here: one pixel each way.
   const Eigen::Vector3d facing = there_from_world.rotation * normal;
+
   const bool slanted = -facing.dot(there) > kMostOblique * there.norm();
   const Eigen::Vector3d across = slanted ? facing : there;
   const Eigen::Vector2d at = camera.project(there);
@@ -47,6 +52,7 @@ std::optional<Sight> sight_of(const maps::Map& map, const maps::Observation& see
     const Eigen::Vector3d ray = camera.unproject(at.x() + du, at.y() + dv, 1.0);
     return Eigen::Vector2d(camera.project(here_from_there * (ray * (across.dot(there) / across.dot(ray)))));
   };
+
   sight.frame_from_patch.col(0) = (0.5 * (carried(1.0, 0.0) - carried(-1.0, 0.0))).cast<float>();
   sight.frame_from_patch.col(1) = (0.5 * (carried(0.0, 1.0) - carried(0.0, -1.0))).cast<float>();
   sight.patch = &keyframe.features->patches[feature];

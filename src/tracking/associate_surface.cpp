@@ -34,31 +34,38 @@ std::vector<optimize::PlaneTerm> associate_surface(const std::vector<WorldSurfac
   std::vector<optimize::PlaneTerm> terms;
   if (in_view != nullptr) *in_view = 0;
   if (depth.empty() || surface.empty()) return terms;
+
   const geometry::Rigid3 depth_from_world = depth_from_camera * camera_from_world;
   const geometry::Rigid3 camera_from_depth = depth_from_camera.inverse();
   const geometry::Rigid3 world_from_depth = depth_from_world.inverse();
   terms.reserve(static_cast<std::size_t>(options.max_samples));
+
   // Take every n-th sample, so that any number of them is spread over all keyframes and the whole image.
   const std::size_t step = 1 + (surface.size() - 1) / static_cast<std::size_t>(options.max_samples);
   for (std::size_t i = 0; i < surface.size(); i += step) {
     const WorldSurface& s = surface[i];
     const Eigen::Vector3d p = depth_from_world * s.point;
     if (p.z() < 0.25 || p.z() > options.max_depth_m + 0.5) continue;
+
     const Eigen::Vector2d pixel = camera.project(p);
     if (!camera.contains(pixel)) continue;
+
     const Eigen::Vector3d normal = depth_from_world.rotation * s.normal;
     const double cosine = -normal.dot(p) / p.norm();
     if (cosine < 0.25) continue;
+
     const double z = depth_at(depth, pixel.x(), pixel.y());
     if (!(z > 0.25) || z > options.max_depth_m) continue;
     if (in_view != nullptr) ++*in_view;
     const Eigen::Vector3d measured = camera.unproject(pixel.x(), pixel.y(), z);
     const double distance = s.normal.dot(world_from_depth * measured - s.point);
     if (std::abs(distance) > options.max_distance_m) continue;
+
     const double measured_sigma = sensor::depth_sigma(z) * std::max(0.3, -normal.z());
     terms.push_back({camera_from_depth * measured, s.point, s.normal,
                      std::sqrt(measured_sigma * measured_sigma + s.sigma * s.sigma)});
   }
+
   return terms;
 }
 

@@ -84,6 +84,7 @@ void FrameAligner::match_landmarks(const AlignmentRound& round) {
   result_.visible_points.clear();
   result_.visible_lines.clear();
   result_.doubtful.clear();
+
   if (in_.options.points) {
     result_.points = match_points(in_.map, in_.local_map.points, features(), in_.camera, pose, radius, how,
                                   &result_.visible_points);
@@ -91,6 +92,7 @@ void FrameAligner::match_landmarks(const AlignmentRound& round) {
       align_points(in_.map, features(), in_.camera, pose, how.scale_factor, result_.points);
     problem_.points = point_terms(in_.map, result_.points, features(), how);
   }
+
   if (in_.options.lines) {
     result_.lines = match_lines(in_.map, in_.local_map.lines, features(), in_.camera, pose, radius, how,
                                 &result_.visible_lines);

@@ -51,6 +51,7 @@ void FrameAligner::judge() {
                                 !motion_prior(estimate.information, predicted_, MotionTrust::kUnknown);
   if (result_.surface_in_view > 0)
     result_.surface_share = static_cast<double>(estimate.planes.inliers) / result_.surface_in_view;
+
   const bool by_features = feature_inliers() >= in_.options.min_inliers;
   const bool by_surface = estimate.planes.inliers >= in_.options.min_surface && result_.surface_share > 0.5;
   const geometry::Matrix6d information = trusted_information(by_features, by_surface);
@@ -58,9 +59,11 @@ void FrameAligner::judge() {
   result_.min_eigenvalue = directions.eigenvalues(0);
   const double limit = degenerate_below(information, uses_features() && !by_features);
   result_.degenerate_directions = static_cast<int>((directions.eigenvalues.array() < limit).count());
+
   // Far corners or one wall leave a direction to the motion model. It may hold that for a while, if the
   // matches are not mere chance.
   const bool many = feature_inliers() >= 3 * in_.options.min_inliers && result_.min_eigenvalue >= kBlind;
+
   // A direction that falls short by a little is no chance find yet, though some of the surface does not fit.
   const bool nearly = result_.min_eigenvalue >= kNearlyHeld * limit;
   const bool all_surface =
@@ -69,6 +72,7 @@ void FrameAligner::judge() {
   result_.onto_degenerate =
       result_.dead_reckoned ? projector_onto_degenerate(directions, limit)
                             : projector_onto_degenerate(principal_directions(estimate.information), kNoisy);
+
   const bool constrained = result_.dead_reckoned
                                ? in_.motion.may_dead_reckon() && ((by_features && many) || all_surface)
                                : by_features || by_surface;

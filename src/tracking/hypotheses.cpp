@@ -45,17 +45,20 @@ Tracker::PoseHypotheses Tracker::pose_hypotheses(const maps::Map& map, const sen
   PoseHypotheses result;
   const Rigid3 predicted = motion_.predict(frame.stamp);
   const Rigid3& last = motion_.camera_from_world();
+
   if (options_.pnp_start) {  // METHOD section 2: PnP, then Levenberg-Marquardt
     const auto seen =
         tracking::relocalise(map, {local_map_.reference}, features, camera_, options_.min_inliers);
     if (seen) result.camera_from_world.push_back(seen->camera_from_world);
     result.searched = seen.has_value();
   }
+
   if (options_.thumbnails) {
     const ThumbnailAlignment alignment = align_thumbnails(thumbnail_, thumbnail_depth_, features.thumbnail,
                                                           camera_, predicted * last.inverse());
     if (alignment.better) result.camera_from_world.push_back(alignment.current_from_previous * last);
   }
+
   result.camera_from_world.push_back(predicted);
   result.camera_from_world.push_back(last);
   if (options_.photometric && features.photometric != nullptr)
@@ -71,6 +74,7 @@ void Tracker::rank_by_intensity(const maps::Map& map, const PhotometricView& vie
   constexpr double kSure = 0.3;  // smallest correlation of a shifted pose
   std::vector<Rigid3>& poses = hypotheses.camera_from_world;
   std::vector<std::optional<double>> agreement;
+
   std::vector<std::optional<optimize::PhotometricFamily>> families;
   for (const Rigid3& pose : poses) {
     const auto& family =
@@ -79,6 +83,7 @@ void Tracker::rank_by_intensity(const maps::Map& map, const PhotometricView& vie
                             ? std::optional(optimize::photometric_correlation(*family, pose, kMinPhotometric))
                             : std::nullopt);
   }
+
   const std::size_t best = best_hypothesis(agreement);
   const Rigid3 likeliest = poses[best];
   if (best > 0) {
@@ -86,6 +91,7 @@ void Tracker::rank_by_intensity(const maps::Map& map, const PhotometricView& vie
     poses.insert(poses.begin(), likeliest);
   }
   if (!families[best] || *agreement[best] >= kGoodAgreement) return;
+
   const ShiftedPose shifted = search_shift(*families[best], likeliest);
   if (shifted.correlation < std::max(kSure, *agreement[best] + kBetterAgreement)) return;
   poses.insert(poses.begin(), shifted.camera_from_world);
@@ -114,11 +120,13 @@ std::optional<TrackResult> Tracker::track_with_motion_model(const maps::Map& map
                                                             const features::FrameFeatures& features) const {
   constexpr double kClearly = 1.15;  // a jump needs this much more support than the pose near by
   if (motion_.expired()) return std::nullopt;
+
   const PoseHypotheses hypotheses = pose_hypotheses(map, frame, features);
   const auto tracked = [&](const TrackResult& attempt) {
     return attempt.state == TrackState::kTracked &&
            (!motion_.outdated() || passes_strict_check(attempt, features));
   };
+
   std::optional<TrackResult> best;
   for (const Rigid3& hypothesis : hypotheses.camera_from_world) {
     TrackResult attempt = align(map, frame, features, hypothesis, motion_.search_radius_px());
@@ -129,9 +137,11 @@ std::optional<TrackResult> Tracker::track_with_motion_model(const maps::Map& map
       if (tracked(near) && !(tracked(attempt) && support(attempt) > kClearly * support(near)))
         attempt = std::move(near);
     }
+
     if (tracked(attempt) && (!best || support(attempt) > support(*best))) best = std::move(attempt);
     if (best && !hypotheses.searched) break;
   }
+
   return best;
 }
 
@@ -141,24 +151,29 @@ std::vector<Tracker::PlaceHypothesis> Tracker::place_hypotheses(
   constexpr std::size_t kAligned = 3;
   std::vector<LookAlike> alike;
   if (options_.thumbnails) alike = look_alikes(map, map.keyframe_ids(), features, kLookAlikes);
+
   std::vector<PlaceHypothesis> hypotheses;
   if (options_.points && !features.points.empty()) {
     std::vector<core::KeyframeId> candidates;
     const auto add = [&candidates](core::KeyframeId id) {
       if (std::find(candidates.begin(), candidates.end(), id) == candidates.end()) candidates.push_back(id);
     };
+
     for (core::KeyframeId id : local_map_.keyframes) add(id);
     if (find_places_) {
       for (core::KeyframeId id : find_places_(features)) add(id);
     }
+
     for (const LookAlike& a : alike) add(a.keyframe);
     const auto seen = tracking::relocalise(map, candidates, features, camera_, options_.min_inliers);
     if (seen) hypotheses.push_back({seen->keyframe, seen->camera_from_world, false});
   }
+
   for (std::size_t i = 0; i < std::min(kAligned, alike.size()); ++i) {
     const core::KeyframeId id = alike[i].keyframe;
     hypotheses.push_back({id, align_look_alike(map, id, features, camera_), true});
   }
+
   return hypotheses;
 }
 

@@ -35,6 +35,7 @@ std::vector<WorldSurface> fuse_voxels(const std::vector<WorldSurface>& samples, 
   cloud::CellMap<std::size_t> index;
   index.reserve(samples.size());
   std::vector<WorldSurface> fused;
+
   std::vector<double> weights;
   for (const WorldSurface& s : samples) {
     const double w = 1.0 / (s.sigma * s.sigma);
@@ -44,17 +45,20 @@ std::vector<WorldSurface> fuse_voxels(const std::vector<WorldSurface>& samples, 
       weights.push_back(w);
       continue;
     }
+
     WorldSurface& f = fused[found->second];
     f.point += w * s.point;
     f.normal += w * s.normal;
     f.sigma = std::min(f.sigma, s.sigma);
     weights[found->second] += w;
   }
+
   for (std::size_t i = 0; i < fused.size(); ++i) {
     fused[i].point /= weights[i];
     fused[i].normal.normalize();
     fused[i].sigma = std::max(0.6 * fused[i].sigma, 1.0 / std::sqrt(weights[i]));
   }
+
   return fused;
 }
 
@@ -68,6 +72,7 @@ std::vector<WorldSurface> collect_surface(const maps::Map& map, const std::vecto
     longest = std::max(longest, map.keyframe(id).surface.size());
     world_from_keyframe.push_back(map.camera_from_world(id).inverse());
   }
+
   for (std::size_t i = 0; i < longest; ++i) {
     for (std::size_t k = 0; k < keyframes.size(); ++k) {
       const auto& surface = map.keyframe(keyframes[k]).surface;
@@ -78,6 +83,7 @@ std::vector<WorldSurface> collect_surface(const maps::Map& map, const std::vecto
                          static_cast<double>(s.sigma)});
     }
   }
+
   return fuse_voxels(samples, voxel_m);
 }
 
@@ -98,8 +104,10 @@ LocalMap build_local_map(const maps::Map& map, KeyframeId reference, const Local
   local.keyframes.push_back(reference);
   const auto wanted = static_cast<std::size_t>(options.keyframes);
   for (const KeyframeId id : map.neighbours(reference, wanted - 1)) append_unique(local.keyframes, id);
+
   // Poses of other components say nothing of where their keyframes lie.
   const KeyframeId root = maps::root_of(map, reference);
+
   const geometry::Rigid3& reference_from_world = map.camera_from_world(reference);
   for (std::int32_t index = reference.index - 1; index >= 0 && index > reference.index - 40; --index) {
     if (local.keyframes.size() >= wanted) break;
@@ -110,6 +118,7 @@ LocalMap build_local_map(const maps::Map& map, KeyframeId reference, const Local
       append_unique(local.keyframes, id);
     }
   }
+
   local.points = map.points_seen_by(local.keyframes);
   local.lines = map.lines_seen_by(local.keyframes);
   std::vector<KeyframeId> dense;
@@ -118,6 +127,7 @@ LocalMap build_local_map(const maps::Map& map, KeyframeId reference, const Local
     if (overlaps(map.camera_from_world(id), reference_from_world, options.overlap_angle_rad))
       dense.push_back(id);
   }
+
   local.surface = collect_surface(map, dense, options.voxel_m);
   return local;
 }

@@ -54,10 +54,12 @@ std::vector<LineMatch> match_lines(const maps::Map& map, const std::vector<core:
     const maps::MapLine* line = map.find(id);
     features::LineSegment predicted;
     if (line == nullptr || !project_segment(*line, camera_from_world, camera, predicted)) continue;
+
     if (visible != nullptr) visible->push_back(id);
     LineMatch best{id, -1, options.max_line_hamming + 1};
     const Eigen::Vector2f d = predicted.direction();
     const float length = predicted.length();
+
     for (std::size_t i = 0; i < candidates.size(); ++i) {
       if (d.dot(candidates[i].direction) < min_cosine) continue;
       const Eigen::Vector2f r = candidates[i].middle - predicted.start;
@@ -69,14 +71,17 @@ std::vector<LineMatch> match_lines(const maps::Map& map, const std::vector<core:
       const int distance = features::hamming(line->descriptor, candidate.descriptor);
       if (distance < best.distance) best = {id, static_cast<int>(i), distance};
     }
+
     if (best.feature < 0) continue;
     LineMatch& slot = by_feature[static_cast<std::size_t>(best.feature)];
     if (slot.feature < 0 || best.distance < slot.distance) slot = best;
   }
+
   std::vector<LineMatch> matches;
   for (const LineMatch& m : by_feature) {
     if (m.feature >= 0) matches.push_back(m);
   }
+
   return matches;
 }
 

@@ -126,6 +126,7 @@ std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<cor
   const auto max_turn = static_cast<float>(options.max_point_angle_rad * 180.0 / 3.14159265358979);
   std::vector<PointMatch> by_feature(frame.points.size());
   std::vector<int> near;
+
   std::vector<int> distances;
   for (core::PointId id : points) {
     const maps::MapPoint* point = map.find(id);
@@ -136,10 +137,12 @@ std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<cor
         !predict(*point, camera_from_world, centre, camera, log_scale, octaves, prediction)) {
       continue;
     }
+
     if (visible != nullptr) visible->push_back(id);
     near.clear();
     const double grown = radius * std::pow(options.scale_factor, std::clamp(prediction.octave, 0, 4));
     frame.grid.within(frame.points, prediction.u, prediction.v, static_cast<float>(grown), near);
+
     const float angle = point->angle + roll.since(point->angle_keyframe);
     const auto unlike = [&](int i) {
       const features::PointFeature& f = frame.points[static_cast<std::size_t>(i)];
@@ -147,20 +150,24 @@ std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<cor
     };
     near.erase(std::remove_if(near.begin(), near.end(), unlike), near.end());
     if (near.empty()) continue;
+
     distances.clear();
     for (const int i : near) {
       const features::Descriptor256& other = frame.descriptors[static_cast<std::size_t>(i)];
       distances.push_back(features::hamming_distance(point->descriptor, other));
     }
+
     const BestTwo best = best_two(frame.points, near, distances);
     if (best.distance > options.max_hamming || best.distance > options.ratio * best.second) continue;
     PointMatch& slot = by_feature[static_cast<std::size_t>(best.feature)];
     if (best.distance < slot.distance) slot = {id, best.feature, best.distance};
   }
+
   std::vector<PointMatch> matches;
   for (const PointMatch& m : by_feature) {
     if (m.feature >= 0) matches.push_back(m);
   }
+
   return matches;
 }
 

@@ -21,10 +21,12 @@ void MotionModel::update(double stamp, const TrackResult& result) {
   constexpr double kDoubt = 0.75;
   const double dt = stamp - stamp_;
   dead_reckoning_s_ = result.dead_reckoned && valid_ ? dead_reckoning_s_ + dt : 0.0;
+
   if (continuous() && dt > 1e-4 && dt < 0.5) {
     const bool known = reliable(stamp);
     const geometry::Vector6d before = velocity_;
     velocity_ = geometry::log_se3(result.camera_from_world * camera_from_world_.inverse()) / dt;
+
     // In directions that little but the motion model holds, steps are noise above all and would accumulate.
     if (known && !result.motion_contradicted)
       velocity_ -= kDoubt * (result.onto_degenerate * (velocity_ - before));
@@ -33,6 +35,7 @@ void MotionModel::update(double stamp, const TrackResult& result) {
   } else {
     reset();
   }
+
   contradicted_ = result.motion_contradicted;
   lost_frames_ = 0;
   stamp_ = stamp;

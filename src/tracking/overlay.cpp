@@ -107,12 +107,14 @@ void draw_lines(cv::Mat& image, const features::FrameFeatures& features, const T
     stroke(image, ends[0], ends[1], feature.line3 ? kMeasured : kFlatLine, 2);
     const maps::MapLine* landmark = map.find(match.line);
     if (landmark == nullptr) continue;
+
     const Eigen::Vector3d a = track.camera_from_world * landmark->start;
     const Eigen::Vector3d b = track.camera_from_world * landmark->end;
     draw_projected_segment(image, a, b, camera);
     const Eigen::Vector3d l = projection * geometry::line_through(a, b).n;
     const Eigen::Vector2d normal = l.head<2>();
     if (!(normal.squaredNorm() > 0.0)) continue;  // through the camera's centre: no image
+
     for (const Pixel& end : ends) {
       const double distance = l.dot(end.homogeneous()) / normal.norm();
       draw_residual(image, end, end - distance * normal.normalized());
@@ -190,12 +192,14 @@ void write_legend(Writer& out) {
   cv::Mat& image = out.image();
   const int top = image.rows - out.px(20);
   out.panel(top, out.px(20));
+
   const int baseline = image.rows - out.px(6);
   const double middle = baseline - out.px(4);
   const auto sample = [&](int& x, const char* words, const cv::Scalar& color, int width) {
     stroke(image, {x, middle}, {x + out.px(14), middle}, color, width);
     x = out.text(x + out.px(18), baseline, words, kText) + out.px(12);
   };
+
   int x = out.px(6);
   sample(x, "measured", kMeasured, 2);
   sample(x, "from the map", kPredicted, 1);
@@ -204,11 +208,13 @@ void write_legend(Writer& out) {
   char zoom[32];
   std::snprintf(zoom, sizeof zoom, "residual x%.0f: 0", kResidualZoom);
   x = out.text(x, baseline, zoom, kText) + out.px(5);
+
   const int length = out.px(60);
   for (int i = 0; i < length; ++i) {
     stroke(image, {x + i, middle - out.px(3)}, {x + i, middle + out.px(3)},
            residual_color(kWorst_px * i / length));
   }
+
   out.text(x + length + out.px(5), baseline, "3 px", kText);
 }
 

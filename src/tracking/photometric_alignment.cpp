@@ -28,6 +28,7 @@ float median_size(const std::vector<float>& sizes) {
     std::memcpy(&bits, &size, sizeof bits);
     return bits >> kMantissaShift;
   };
+
   std::array<std::uint32_t, 1U << (32 - kMantissaShift)> counts{};
   for (const float size : sizes) ++counts[bin_of(size)];
   std::size_t rank = sizes.size() / 2;
@@ -35,9 +36,11 @@ float median_size(const std::vector<float>& sizes) {
   for (; rank >= counts[bin]; ++bin) rank -= counts[bin];
   std::vector<float> alike;
   alike.reserve(counts[bin]);
+
   for (const float size : sizes) {
     if (bin_of(size) == bin) alike.push_back(size);
   }
+
   const auto place = alike.begin() + static_cast<std::ptrdiff_t>(rank);
   std::nth_element(alike.begin(), place, alike.end());
   return *place;
@@ -60,15 +63,18 @@ void weigh_by_depth(const Rigid3& camera_from_reference, optimize::PhotometricFa
   const Eigen::Matrix3f rotation = camera_from_reference.rotation.cast<float>();
   const Eigen::Vector3f translation = camera_from_reference.translation.cast<float>();
   const auto fx = static_cast<float>(family.camera.fx), fy = static_cast<float>(family.camera.fy);
+
   const auto per_sigma = static_cast<float>(family.gain / family.sigma);
   for (optimize::PhotometricTerm& term : family.terms) {
     const float z = term.point.z();
     const Eigen::Vector3f along = rotation * (term.point / z);
     const Eigen::Vector3f p = along * z + translation;
     const float per_z = 1.0F / p.z();
+
     // Derivative of the pixel with respect to the sample's depth.
     const Eigen::Vector2f shift(fx * (along.x() - p.x() * per_z * along.z()) * per_z,
                                 fy * (along.y() - p.y() * per_z * along.z()) * per_z);
+
     // by_point = gradient times focal length over depth
     const Eigen::Vector2f gradient(term.derivative(0) * z / fx, term.derivative(1) * z / fy);
     const float grey = kCommon * gradient.dot(shift) *
@@ -131,10 +137,12 @@ std::optional<optimize::PhotometricFamily> photometric_in_view(const features::P
                                                                const Rigid3& camera_from_world) {
   const cv::Mat& image = (*view.image)[level];
   if (image.empty() || static_cast<int>(samples[level].size()) < kMinPhotometric) return std::nullopt;
+
   optimize::PhotometricFamily family;
   family.image = image;
   family.camera = features::photometric_camera(view.camera, level);
   family.reference_from_world = reference_from_world;
+
   const Rigid3 camera_from_reference = camera_from_world * reference_from_world.inverse();
   const Eigen::Matrix3f rotation = camera_from_reference.rotation.cast<float>();
   const Eigen::Vector3f translation = camera_from_reference.translation.cast<float>();
@@ -143,14 +151,17 @@ std::optional<optimize::PhotometricFamily> photometric_in_view(const features::P
   const auto fx = static_cast<float>(family.camera.fx), fy = static_cast<float>(family.camera.fy);
   const bool with_depth = view.depth != nullptr && !view.depth->empty();
   family.terms.reserve(samples[level].size());
+
   for (const features::PhotometricSample& s : samples[level]) {
     const Eigen::Vector3f p = rotation * s.point + translation;
     if (!(p.z() > 0.1F)) continue;
     if (!family.camera.contains(family.camera.project(p.cast<double>()), 2.0)) continue;
     if (with_depth && hidden(view, depth_rotation * p + depth_translation)) continue;
+
     optimize::PhotometricTerm term;
     term.point = s.point;
     term.value = s.value;
+
     const float per_z = 1.0F / s.point.z();
     const Eigen::Vector3f by_point(
         s.gradient.x() * fx * per_z, s.gradient.y() * fy * per_z,
@@ -159,6 +170,7 @@ std::optional<optimize::PhotometricFamily> photometric_in_view(const features::P
     term.derivative.tail<3>() = s.point.cross(by_point);
     family.terms.push_back(term);
   }
+
   if (static_cast<int>(family.terms.size()) < kMinPhotometric) return std::nullopt;
   return family;
 }
@@ -171,20 +183,24 @@ bool update_photometric(optimize::PhotometricFamily& family, const Rigid3& camer
   std::vector<float> sizes, expected;
   sizes.reserve(seen.size());
   expected.reserve(seen.size());
+
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (std::isnan(seen[i])) continue;
     sizes.push_back(std::abs(seen[i]));
     expected.push_back(std::abs(family.terms[i].value));
   }
+
   if (static_cast<int>(sizes.size()) < kMinPhotometric) return false;
   family.gain = std::clamp(
       static_cast<double>(median_size(sizes)) / std::max(static_cast<double>(median_size(expected)), 1e-3),
       1.0 / kLargestGain, kLargestGain);
   sizes.clear();
+
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (!std::isnan(seen[i]))
       sizes.push_back(std::abs(seen[i] - static_cast<float>(family.gain) * family.terms[i].value));
   }
+
   family.sigma = std::max(kMinSigma, 1.4826 * static_cast<double>(median_size(sizes)));
   weigh_by_depth(camera_from_world * family.reference_from_world.inverse(), family);
   return true;

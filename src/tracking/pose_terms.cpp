@@ -13,6 +13,7 @@ std::vector<optimize::PointTerm> point_terms(const maps::Map& map, const std::ve
                                              const AssociationOptions& options) {
   std::vector<optimize::PointTerm> terms;
   terms.reserve(matches.size());
+
   for (const PointMatch& match : matches) {
     const features::PointFeature& f = features.points[static_cast<std::size_t>(match.feature)];
     optimize::PointTerm term;
@@ -20,14 +21,17 @@ std::vector<optimize::PointTerm> point_terms(const maps::Map& map, const std::ve
     term.pixel = (f.pixel + match.shift).cast<double>();
     term.pixel_sigma =
         std::pow(options.scale_factor, f.octave) * (match.aligned ? options.aligned_sigma : 1.0);
+
     const float depth = features.depth_beside(static_cast<std::size_t>(match.feature), match.shift);
     if (depth > 0.0F) {
       term.depth = static_cast<double>(depth);
       // The landmark's own depth is no better than the measurement.
       term.depth_sigma = std::sqrt(2.0) * sensor::depth_sigma(term.depth);
     }
+
     terms.push_back(term);
   }
+
   return terms;
 }
 

@@ -26,11 +26,13 @@ std::vector<Pair> match_all(const maps::Map& map, core::KeyframeId keyframe,
     int distance = 257;
     core::PointId point;
   };
+
   std::vector<Best> by_feature(distances.size());
   for (core::PointId id : map.points_of(keyframe)) {
     if (!id.valid() || distances.empty()) continue;
     features::hamming_distances(map.point(id).descriptor, frame.descriptors.data(), distances.size(),
                                 distances.data());
+
     const auto best = std::min_element(distances.begin(), distances.end());
     const auto feature = static_cast<std::size_t>(best - distances.begin());
     int second = 257;
@@ -38,13 +40,16 @@ std::vector<Pair> match_all(const maps::Map& map, core::KeyframeId keyframe,
       const bool elsewhere = (frame.points[i].pixel - frame.points[feature].pixel).norm() > 4.0F;
       if (elsewhere) second = std::min(second, distances[i]);
     }
+
     if (*best > kMaxHamming || *best > kRatio * second) continue;
     if (*best < by_feature[feature].distance) by_feature[feature] = {*best, id};
   }
+
   std::vector<Pair> pairs;
   for (std::size_t i = 0; i < by_feature.size(); ++i) {
     if (by_feature[i].point.valid()) pairs.push_back({by_feature[i].point, static_cast<int>(i)});
   }
+
   return pairs;
 }
 
@@ -79,6 +84,7 @@ std::optional<Relocalisation> relocalise(const maps::Map& map,
     const std::vector<Pair> pairs = match_all(map, id, features);
     // P3P has up to four solutions; a fourth pair must be there to choose, whatever the threshold.
     if (static_cast<int>(pairs.size()) < std::max(4, min_inliers)) continue;
+
     std::vector<cv::Point3d> world;
     std::vector<cv::Point2d> pixels;
     for (const Pair& pair : pairs) {
@@ -87,19 +93,23 @@ std::optional<Relocalisation> relocalise(const maps::Map& map,
       world.emplace_back(p.x(), p.y(), p.z());
       pixels.emplace_back(static_cast<double>(uv.x()), static_cast<double>(uv.y()));
     }
+
     cv::Vec3d rotation;
     cv::Vec3d translation;
     std::vector<int> inliers;
+
     // OpenCV's RANSAC seeds its own generator the same way each time.
     const bool solved = cv::solvePnPRansac(world, pixels, k, cv::noArray(), rotation, translation, false, 200,
                                            4.0F, 0.99, inliers, cv::SOLVEPNP_P3P);
     const int count = static_cast<int>(inliers.size());
     if (!solved || count < min_inliers || (best && best->inliers >= count)) continue;
+
     const Eigen::Vector3d r(rotation[0], rotation[1], rotation[2]);
     const geometry::Rigid3 start(geometry::exp_so3(r),
                                  Eigen::Vector3d(translation[0], translation[1], translation[2]));
     best = Relocalisation{id, settled(start, world, pixels, inliers, camera), count};
   }
+
   return best;
 }
 

@@ -46,6 +46,7 @@ HalfDepth half_depth(const cv::Mat& depth) {
   raw.width = depth.cols / 2;
   raw.height = depth.rows / 2;
   raw.z.assign(static_cast<std::size_t>(raw.width * raw.height), 0.0F);
+
   for (int y = 0; y < raw.height; ++y) {
     const float* r0 = depth.ptr<float>(2 * y);
     const float* r1 = depth.ptr<float>(2 * y + 1);
@@ -54,6 +55,7 @@ HalfDepth half_depth(const cv::Mat& depth) {
       float sum = 0.0F;
       int count = 0;
       float low = 1e9F;
+
       float high = 0.0F;
       for (float v : q) {
         if (!(v > 0.0F)) continue;
@@ -62,11 +64,13 @@ HalfDepth half_depth(const cv::Mat& depth) {
         low = std::min(low, v);
         high = std::max(high, v);
       }
+
       if (count >= 2 && high - low < same_surface(low)) {
         raw.z[static_cast<std::size_t>(y * raw.width + x)] = sum / static_cast<float>(count);
       }
     }
   }
+
   HalfDepth smooth = raw;
   const auto read = [&raw](int x, int y) { return raw.at(x, y); };
   for (int y = 0; y < raw.height; ++y) {
@@ -75,6 +79,7 @@ HalfDepth half_depth(const cv::Mat& depth) {
           surface_mean(read, x, y, raw.width, raw.height, 1);
     }
   }
+
   return smooth;
 }
 
@@ -121,6 +126,7 @@ std::vector<SurfaceCandidate> candidates(const HalfDepth& depth, const sensor::P
     const double z = depth.at(x, y);
     return camera.unproject(2.0 * x + 0.5, 2.0 * y + 0.5, z).cast<float>().eval();
   };
+
   const auto min_cosine = static_cast<float>(std::cos(options.max_incidence_rad));
   std::vector<SurfaceCandidate> result;
   for (int y = 3; y < depth.height - 3; y += 2) {
@@ -128,9 +134,11 @@ std::vector<SurfaceCandidate> candidates(const HalfDepth& depth, const sensor::P
       const float z = depth.at(x, y);
       if (z < static_cast<float>(options.min_depth_m) || z > static_cast<float>(options.max_depth_m))
         continue;
+
       const int bx = straight_base(depth, x, y, 1, 0);
       const int by = straight_base(depth, x, y, 0, 1);
       if (bx == 0 || by == 0) continue;
+
       SurfaceCandidate c;
       c.sample.point = point(x, y);
       const Eigen::Vector3f du = point(x + bx, y) - point(x - bx, y);
@@ -138,6 +146,7 @@ std::vector<SurfaceCandidate> candidates(const HalfDepth& depth, const sensor::P
       c.sample.normal = dv.cross(du).normalized();  // x right, y down: towards the camera
       const float cosine = -c.sample.normal.dot(c.sample.point.normalized());
       if (!(cosine > min_cosine)) continue;
+
       // Smoothing leaves part of the noise, which acts along the ray.
       c.sample.sigma =
           0.5F * static_cast<float>(sensor::depth_sigma(z)) * std::max(0.3F, -c.sample.normal.z());
@@ -146,6 +155,7 @@ std::vector<SurfaceCandidate> candidates(const HalfDepth& depth, const sensor::P
       result.push_back(c);
     }
   }
+
   return result;
 }
 
@@ -187,6 +197,7 @@ std::vector<maps::SurfaceSample> sample_surface(const cv::Mat& depth, const sens
   // A fixed scrambled order, so that "the first of a group" is not always its top-left corner.
   std::vector<std::uint32_t> order(all.size());
   for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+
   const auto scramble = [](std::uint32_t i) {
     i ^= i >> 16;
     i *= 0x7feb352dU;
@@ -194,8 +205,10 @@ std::vector<maps::SurfaceSample> sample_surface(const cv::Mat& depth, const sens
     i *= 0x846ca68bU;
     return i ^ (i >> 16);
   };
+
   std::sort(order.begin(), order.end(),
             [&](std::uint32_t a, std::uint32_t b) { return scramble(a) < scramble(b); });
+
   std::vector<char> taken(all.size(), 0);
   take_evenly(
       all, order, [](const SurfaceCandidate& c) { return c.cell; }, kCellsX * kCellsY, options.samples / 2,
@@ -203,11 +216,13 @@ std::vector<maps::SurfaceSample> sample_surface(const cv::Mat& depth, const sens
   take_evenly(
       all, order, [](const SurfaceCandidate& c) { return c.bin; }, kAzimuths * kElevations,
       options.samples - options.samples / 2, taken);
+
   std::vector<maps::SurfaceSample> result;
   result.reserve(static_cast<std::size_t>(options.samples));
   for (std::uint32_t i : order) {
     if (taken[i] != 0) result.push_back(all[i].sample);
   }
+
   return result;
 }
 

@@ -54,11 +54,13 @@ Step linearise(const std::vector<ThumbnailPixel>& pixels, const cv::Mat& current
   for (const ThumbnailPixel& pixel : pixels) {
     const Eigen::Vector3d p = pose * pixel.point;
     if (p.z() < 0.1) continue;
+
     const Eigen::Vector2d uv = camera.project(p);
     double value = 0.0;
     double du = 0.0;
     double dv = 0.0;
     if (!sample(current, uv.x(), uv.y(), value, du, dv)) continue;
+
     const double r = value - bias - static_cast<double>(pixel.value);
     const double weight = std::abs(r) <= loss ? 1.0 : loss / std::abs(r);
     const double iz = 1.0 / p.z();
@@ -67,17 +69,21 @@ Step linearise(const std::vector<ThumbnailPixel>& pixels, const cv::Mat& current
     Vector7d j;
     j << dp, p.cross(dp), -1.0;
     alignas(32) const double row[8] = {j(0), j(1), j(2), j(3), j(4), j(5), j(6), 0.0};
+
     for (int a = 0; a < 7; ++a) {
       const double wa = weight * row[a];
       for (int b = 0; b < (a < 4 ? 4 : 8); ++b) h[a][b] += wa * row[b];
     }
+
     step.g.noalias() += weight * r * j;
     step.squares += weight * r * r;
     ++step.count;
   }
+
   for (int a = 0; a < 7; ++a) {
     for (int b = 0; b <= a; ++b) step.h(a, b) = h[a][b];
   }
+
   return step;
 }
 
@@ -110,16 +116,19 @@ ThumbnailAlignment align_thumbnails(const cv::Mat& previous, const cv::Mat& prev
 
   constexpr double kLoss = 8.0;            // grey values
   constexpr double kIntensitySigma = 4.0;  // of noise and interpolation
+
   // Weak prior around the guess: 5 cm, 3 degrees. It holds directions that the image does not show.
   Vector7d belief;
   belief << 400.0, 400.0, 400.0, 365.0, 365.0, 365.0, 0.0;
   belief *= kIntensitySigma * kIntensitySigma;
+
   Rigid3 pose = guess;
   double bias = cv::mean(current)[0] - cv::mean(previous)[0];
   double best = -1.0;
   for (int i = 0; i < 12; ++i) {
     const Step step = linearise(pixels, current, small, pose, bias, kLoss);
     if (step.count < 200) break;
+
     const double rms = std::sqrt(step.squares / step.count);
     if (i == 0) result.initial_rms = rms;
     if (best < 0.0 || rms < best) {
@@ -128,16 +137,19 @@ ThumbnailAlignment align_thumbnails(const cv::Mat& previous, const cv::Mat& prev
       result.rms = rms;
       result.pixels = step.count;
     }
+
     Matrix7d h = step.h;
     h.diagonal() += belief + Vector7d::Constant(1e-6);
     Vector7d g = step.g;
     g.head<6>() += belief.head<6>().cwiseProduct(geometry::log_se3(pose * guess.inverse()));
     const Vector7d delta = -h.ldlt().solve(g);  // reads the lower triangle
     if (!delta.allFinite()) break;
+
     pose = geometry::exp_se3(delta.head<6>()) * pose;
     bias += delta(6);
     if (delta.head<6>().cwiseAbs().maxCoeff() < 2e-4) break;
   }
+
   result.better = result.pixels > 0 && result.rms < 0.97 * result.initial_rms;
   return result;
 }

@@ -43,6 +43,7 @@ void TrackerOptions::declare(core::OptionTable& table) {
   table.boolean(
       "pnp_start", pnp_start,
       "Start every frame with PnP over descriptors, if there are enough, instead of the motion model");
+
   table.number("readout", readout_s, {0.0, 0.1}, "s",
                "Rolling shutter: time from the first to the last row of an image; 0: from the camera file");
   table.integer("min_inliers", min_inliers, {3, 1000}, "",

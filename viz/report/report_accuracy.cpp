@@ -158,6 +158,7 @@ std::string saved_html(const ReportData& data) {
   for (const std::string& name : names) {
     std::ifstream stream(data.folder / name, std::ios::binary);
     const Json json = Json::parse(stream, nullptr, false);
+
     if (json.is_object() && json.contains("ate_m")) {
       add_saved_path(name, json, paths);
     } else if (json.is_object() && json.contains("estimates")) {

@@ -56,6 +56,7 @@ std::string merge_evidence(const Json& m) {
           {"Spread of the keyframes",
            "{/span_m:2 m} and {/span_rad:0 deg} apart; they agree to {/spread_m:1 mm}"},
           {"Pairs of the pose graph", "{/pairs}, of which {/rejected} were rejected"}});
+
   facts.insert(facts.begin(),
                {"Decision", flag_at(m, "/accepted") ? "merged" : "not merged: " + text_at(m, "/reason")});
 
@@ -66,6 +67,7 @@ std::string merge_evidence(const Json& m) {
                               "{/alternative_overlay/matched} found again ({/alternative_overlay/chance} by "
                               "chance), {/alternative_overlay/seen_through} seen through"));
   }
+
   if (number_at(m, "/time_s") >= 0.0)
     facts.emplace_back("Certain after", filled(m, "{/time_s:1 s of the recordings}"));
   if (!list_at(m, "/sigma").empty()) {
@@ -74,6 +76,7 @@ std::string merge_evidence(const Json& m) {
                               "{/sigma/0:1 mm}, {/sigma/1:1 mm}, {/sigma/2:1 mm} along x, y, z; "
                               "{/sigma/3:2 deg}, {/sigma/4:2 deg}, {/sigma/5:2 deg} about them"));
   }
+
   return facts_html(facts);
 }
 
@@ -199,6 +202,7 @@ std::string loops_html(const ReportData& data) { return closings_html(data) + fe
 std::string merges_html(const ReportData& data) {
   const Json& list = list_at(data.summary, "/merges");
   if (list.empty()) return {};
+
   JsonTable overview({{"maps", ""},
                       {"", ""},
                       {">look alike", "{/candidates}"},
@@ -207,6 +211,7 @@ std::string merges_html(const ReportData& data) {
                       {">confirmed", "{/confirmed} of {/expected}"},
                       {">landmarks found again", "{/overlay/matched} of {/overlay/expected}"},
                       {"why not", "{/reason:text}"}});
+
   std::string details;
   for (const Json& m : list) {
     const bool accepted = flag_at(m, "/accepted");
@@ -215,6 +220,7 @@ std::string merges_html(const ReportData& data) {
     details +=
         folded("Evidence: " + names, merge_evidence(m) + refused_pairs(m), list.size() <= kShownMerges);
   }
+
   return overview.html() + details;
 }
 

@@ -156,6 +156,7 @@ class RobotCharts {
         line.y.push_back(other == root ? 0.5 : kNaN);
       }
       if (!(root >= 0.0) || lines.count(static_cast<int>(root)) != 0) continue;
+
       viz::SvgLine& line = lines[static_cast<int>(root)];
       line.label = lines.size() == 1 ? "first map" : fmt::format("map of keyframe {:.0f}", root);
       line.kind = fmt::format("k{}", (lines.size() - 1) % 8);
@@ -206,6 +207,7 @@ static std::string components_html(const ReportData& data) {
                    {">keyframes", "{/keyframes}"},
                    {"", ""},
                    {"why not", "{/why_not:text}"}});
+
   for (const auto& component : list) {
     const bool joined = flag_at(component, "/joined");
     const double after = number_at(component, "/joined_s");
@@ -218,6 +220,7 @@ static std::string components_html(const ReportData& data) {
                count_text(number_at(component, "/keyframes")), when},
               joined ? "yes" : "bad");
   }
+
   const double dropped = number_at(data.summary, "/components/dropped");
   if (table.rows() == 0 && !(dropped > 0.0)) return {};
 

@@ -178,9 +178,11 @@ Json scene_json(const Scene& scene, Pieces& pieces, Cost& cost) {
                             {"a", numbers(shown(arc.from, scene.z_up))},
                             {"b", numbers(shown(arc.to, scene.z_up))}});
   }
+
   json["walls"] = segments_json(scene.walls, scene.z_up);
   json["doors"] = segments_json(scene.doors, scene.z_up);
   json["rooms"] = Json::array();
+
   for (const auto& [place, text] : scene.rooms)
     json["rooms"].push_back(Json::array({numbers(shown(place, scene.z_up)), text}));
   if (!scene.live.empty()) json["live"] = scene.live;

@@ -37,6 +37,7 @@ tl::expected<sensor::Lens, std::string> lens_of(const CameraInfoMessage& info) {
   const bool none = std::all_of(info.d.begin(), info.d.end(), [](double k) { return k == 0.0; });
   const bool fisheye = model == "equidistant" || model == "fisheye";
   if (none && !fisheye) return lens;
+
   if (fisheye) {
     lens.model = sensor::LensModel::kEquidistant;
   } else if (model != "plumb_bob" && model != "rational_polynomial" &&
@@ -44,6 +45,7 @@ tl::expected<sensor::Lens, std::string> lens_of(const CameraInfoMessage& info) {
     return tl::unexpected(fmt::format(
         "has the distortion model '{}' (known: plumb_bob, rational_polynomial, equidistant)", model));
   }
+
   const std::size_t most = fisheye ? 4 : lens.k.size();
   // OpenCV's models of 12 and 14 coefficients have further ones that are nearly always 0.
   for (std::size_t i = 0; i < info.d.size(); ++i) {
@@ -52,6 +54,7 @@ tl::expected<sensor::Lens, std::string> lens_of(const CameraInfoMessage& info) {
           fmt::format("has {} coefficients of distortion ({} are read)", info.d.size(), most));
     if (i < most) lens.k[i] = info.d[i];
   }
+
   return lens;
 }
 
@@ -197,6 +200,7 @@ core::Result<void> add_depth_camera(const BagSurvey& survey, const ChosenTopics&
   const bool by_name = depth_name.find("aligned_depth") != std::string::npos ||
                        depth_name.find("registered") != std::string::npos;
   if (same && (by_name || color.frame == depth.frame)) return {};
+
   const auto motion = color_from_depth(survey, topics, color, depth);
   if (!motion) {
     return core::usage_error(
@@ -207,6 +211,7 @@ core::Result<void> add_depth_camera(const BagSurvey& survey, const ChosenTopics&
                     "with color_from_depth with --camera",
                     survey.path, topics.color.topic->topic.name, color.frame, depth_name, depth.frame));
   }
+
   const bool nothing_moves = motion->rotation.isIdentity(kNothing) && motion->translation.isZero(kNothing);
   if (same && nothing_moves) return {};
   reading.camera.color_from_depth = *motion;
@@ -234,6 +239,7 @@ core::Result<std::optional<sensor::CameraReading>> bag_camera(const BagSurvey& s
   reading.camera.model = (*color)->lens.model;
   reading.camera.distortion = (*color)->lens.k;
   reading.camera.depth_scale = kMillimetres;
+
   const std::string stream = realsense_stream(topics.depth.topic->topic.name);
   if (!stream.empty()) reading.camera.depth_scale = realsense_depth_scale(survey, stream);
 
@@ -243,10 +249,12 @@ core::Result<std::optional<sensor::CameraReading>> bag_camera(const BagSurvey& s
     if (auto added = add_depth_camera(survey, topics, **color, **depth, reading); !added)
       return tl::unexpected(added.error());
   }
+
   if (const std::string wrong = sensor::camera_problem(reading.camera); !wrong.empty()) {
     return core::input_error(fmt::format("{}: {}: {}; name a camera file with --camera", survey.path,
                                          topics.info.topic->topic.name, wrong));
   }
+
   return reading;
 }
 

@@ -76,6 +76,7 @@ ImageList list_of(const BagSurvey& survey, const SurveyedTopic& topic, core::Log
   list.decoder = topic.decoder;
   list.images = topic.images;
   list.prefix = fmt::format("{}:{}#", survey.path, topic.topic.name);
+
   const bool stamped = std::any_of(list.images.begin(), list.images.end(),
                                    [](const ImageEntry& entry) { return entry.stamp_ns != 0; });
   if (!stamped) {
@@ -83,6 +84,7 @@ ImageList list_of(const BagSurvey& survey, const SurveyedTopic& topic, core::Log
         fmt::format("{}: {} has no stamps; the times of recording are taken", survey.path, topic.topic.name));
     for (ImageEntry& entry : list.images) entry.stamp_ns = entry.log_ns;
   }
+
   if (const std::size_t dropped = drop_damaged(survey, list.images); dropped > 0)
     log.warning(
         fmt::format("{}: {} images of {} are damaged and left out", survey.path, dropped, topic.topic.name));
@@ -146,6 +148,7 @@ core::Result<Layout> read_bag(const std::filesystem::path& path, const TopicName
   const double own_delay_s = layout.camera ? layout.camera->camera.depth_delay_s : 0.0;
   const double delay_s = options.depth_delay_s != 0.0 ? options.depth_delay_s : own_delay_s;
   layout.pairs = pair_by_stamp(color_files, depth_files, options.max_pair_gap_s, delay_s);
+
   if (layout.pairs.empty()) {
     if (color_files.empty() || depth_files.empty())
       return core::input_error(survey->path + ": no image of colour or depth can be read");
@@ -153,6 +156,7 @@ core::Result<Layout> read_bag(const std::filesystem::path& path, const TopicName
         survey->path + ": " +
         no_common_time(color.topic.name, color_files, depth.topic.name, depth_files, options.max_pair_gap_s));
   }
+
   if (layout.camera && survey->camera_yaml.empty()) layout.camera->camera.fps = usual_fps(layout.pairs);
   layout.images = std::make_shared<BagImages>(survey->files, std::move(color), std::move(depth));
   return layout;

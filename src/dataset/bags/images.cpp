@@ -140,6 +140,7 @@ bool is_compressed_depth(const std::string& format) {
 MessageImage image_of(const ImageMessage& message) {
   const RawEncoding* encoding = encoding_of(message.encoding);
   if (encoding == nullptr) return tl::unexpected(not_known(message.encoding));
+
   const std::uint64_t width_bytes = std::uint64_t{message.width} * CV_ELEM_SIZE(encoding->type);
   const std::uint64_t step = message.step == 0 ? width_bytes : message.step;
   const std::uint64_t pixels = std::uint64_t{message.width} * message.height;
@@ -155,10 +156,12 @@ MessageImage image_of(const ImageMessage& message) {
     std::memcpy(image.ptr(v), message.data.data() + static_cast<std::size_t>(v) * step, width_bytes);
   if (message.big_endian && image.elemSize1() > 1) swap_bytes(image);
   if (encoding->conversion == kAsItIs) return image;
+
   const bool pairs = encoding->type == CV_8UC2;  // of pixels, which share their colour
   if (pairs && image.cols % 2 != 0)
     return tl::unexpected<std::string>(
         fmt::format("has an odd width of {} for {}", image.cols, encoding->name));
+
   cv::Mat converted;
   cv::cvtColor(image, converted, encoding->conversion);
   return converted;

@@ -163,6 +163,7 @@ core::Result<BagSurvey> survey_bag(const fs::path& path) {
   survey.path = path.string();
   const auto& readers = core::part<BagReaders>();
   if (!readers) return tl::unexpected(readers.error());
+
   Surveyor surveyor(survey, **readers);
   core::Error first_problem;
   for (const fs::path& file : files_of(path)) {
@@ -173,11 +174,13 @@ core::Result<BagSurvey> survey_bag(const fs::path& path) {
     if (first_problem.message.empty()) first_problem = added.error();
     survey.notes.push_back(added.error().message);
   }
+
   if (survey.files.empty()) return tl::unexpected(first_problem);
   if (surveyor.without_stamp() > 0) {
     survey.notes.push_back(fmt::format("{}: {} images have a damaged head and are left out", survey.path,
                                        surveyor.without_stamp()));
   }
+
   const bool any = std::any_of(survey.topics.begin(), survey.topics.end(),
                                [](const SurveyedTopic& topic) { return topic.count > 0; });
   if (!any) {
@@ -185,9 +188,11 @@ core::Result<BagSurvey> survey_bag(const fs::path& path) {
     for (const std::string& note : survey.notes) message += "; " + note;
     return core::input_error(message);
   }
+
   std::sort(survey.topics.begin(), survey.topics.end(), [](const SurveyedTopic& a, const SurveyedTopic& b) {
     return std::tie(a.topic.name, a.topic.type) < std::tie(b.topic.name, b.topic.type);
   });
+
   return survey;
 }
 

@@ -185,6 +185,7 @@ core::Result<ChosenTopic> choose_color(const BagSurvey& survey, const std::vecto
     const bool named = contains(name, "color") || contains(name, "rgb");
     return std::tuple(colored, named, common_parts(name, depth), contains(name, "rect"));
   };
+
   std::stable_sort(colors.begin(), colors.end(),
                    [&](const Candidate& a, const Candidate& b) { return rank(a) > rank(b); });
   if (rank(colors[0]) != rank(colors[1])) {
@@ -192,6 +193,7 @@ core::Result<ChosenTopic> choose_color(const BagSurvey& survey, const std::vecto
                        "of several colour images the one of depth's camera, by its name",
                        colors.front().encoding};
   }
+
   return core::usage_error(fmt::format("{}: has {} colour images: {}; name one with --topic color={}",
                                        survey.path, colors.size(), names_of(colors),
                                        colors.front().topic->topic.name));
@@ -205,6 +207,7 @@ core::Result<ChosenTopic> choose_info(const BagSurvey& survey, const std::string
     if (topic.is("sensor_msgs/CameraInfo") && topic.count > 0 && topic.decoder != nullptr)
       infos.push_back(&topic);
   }
+
   if (!named.empty()) {
     for (const SurveyedTopic* topic : infos) {
       if (topic->topic.name == named) return ChosenTopic{topic, "named by --topic", ""};
@@ -213,10 +216,12 @@ core::Result<ChosenTopic> choose_info(const BagSurvey& survey, const std::string
                                          option, named, survey.path));
   }
   if (infos.empty()) return ChosenTopic{};
+
   const std::string beside = parent_of(image_name(image)) + "/camera_info";
   for (const SurveyedTopic* topic : infos) {
     if (topic->topic.name == beside) return ChosenTopic{topic, "beside the image", ""};
   }
+
   if (infos.size() == 1) return ChosenTopic{infos.front(), "the only CameraInfo", ""};
 
   std::stable_sort(infos.begin(), infos.end(), [&image](const SurveyedTopic* a, const SurveyedTopic* b) {

@@ -49,6 +49,7 @@ core::Result<ConvertSummary> copy_frames(const FrameSource& source, CopyTarget& 
       summary.stopped = true;
       break;
     }
+
     const PairInfo info = source.info(i);
     const auto pair = source.stored(i);
     core::Result<void> added;
@@ -56,12 +57,14 @@ core::Result<ConvertSummary> copy_frames(const FrameSource& source, CopyTarget& 
       added = target.add(nanoseconds(info.stamp),
                          nanoseconds(info.depth_stamp - source.camera().depth_delay_s), *pair);
     }
+
     const core::Error* problem = !pair ? &pair.error() : !added ? &added.error() : nullptr;
     if (problem != nullptr && problem->kind != core::ErrorKind::kInput) return tl::unexpected(*problem);
     if (problem != nullptr && summary.unreadable++ == 0) first_error = problem->message;
     if (problem == nullptr) ++summary.written;
     if (options.progress) options.progress(i + 1);
   }
+
   if (summary.written > 0) return summary;
   return core::input_error(
       fmt::format("{}: no frame can be copied; the first: {}", source.name(), first_error));
@@ -102,10 +105,12 @@ core::Result<ConvertSummary> convert_recording(const FrameSource& source, const 
     log.warning("the poses that the recorder kept are not in the copy: it is tracked without them");
   if (summary) done = (*target)->finish(odometry ? std::nullopt : source.truth());
   if (summary && done && !file) done = put_in_place(folder, out);
+
   if (!summary || !done) {
     if (!file) fs::remove_all(folder, ignored);
     return tl::unexpected(summary ? done.error() : summary.error());
   }
+
   return summary;
 }
 

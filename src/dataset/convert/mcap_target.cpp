@@ -127,6 +127,7 @@ class McapTarget final : public CopyTarget {
     if (depth.type() == CV_16UC3) cv::extractChannel(depth, depth, 0);
     if (depth.type() == CV_64FC1) depth.convertTo(depth, CV_32F);
     const bool others = standard_depth_ && camera_.depth_scale != kMillimetresOfMetre;
+
     if (depth.type() == CV_16UC1 && (camera_.depth_scale == kFloatDepthScale || others)) {
       cv::Mat metres(depth.size(), CV_32FC1);
       for (int v = 0; v < depth.rows; ++v) {
@@ -138,6 +139,7 @@ class McapTarget final : public CopyTarget {
       }
       depth = metres;
     }
+
     const bool odd = depth.type() == CV_16UC1 && camera_.depth_scale != kMillimetresOfMetre;
     if (odd && !told_scale_) {
       log_.warning(
@@ -146,6 +148,7 @@ class McapTarget final : public CopyTarget {
                       camera_.depth_scale));
       told_scale_ = true;
     }
+
     return message_of(depth, header, encoding_of_pixels(depth));
   }
 

@@ -140,6 +140,7 @@ class Player {
       // Decoded before it is due.
       const auto pair = source_.stored(i);
       wait_until_due(info.stamp - first);
+
       core::Result<void> added;
       if (pair) {
         added =
@@ -147,12 +148,14 @@ class Player {
                          nanoseconds(info.depth_stamp - source_.camera().depth_delay_s + offset_s_), *pair);
       }
       if (!writer_->problem()) return writer_->problem();
+
       const core::Error* problem = !pair ? &pair.error() : !added ? &added.error() : nullptr;
       if (problem != nullptr && summary_.unreadable++ == 0) first_error_ = problem->message;
       if (problem == nullptr) ++summary_.published;
       ++frames_;
       if (options_.progress) options_.progress(frames_, options_.loop ? 0 : source_.size());
     }
+
     return {};
   }
 

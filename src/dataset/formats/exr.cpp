@@ -60,6 +60,7 @@ cv::Mat read_channel(const Bytes& bytes) {
   if (channel.empty() || width < 1 || height < 1 || width > 32768 || height > 32768 ||
       width * height > kMaxPixels)
     return {};
+
   const Imf::Channel* sampled = file.header().channels().findChannel(channel.c_str());
   if (sampled == nullptr || sampled->xSampling != 1 || sampled->ySampling != 1) return {};
 
@@ -67,6 +68,7 @@ cv::Mat read_channel(const Bytes& bytes) {
   const std::size_t row = image.step[0];
   char* const origin = reinterpret_cast<char*>(image.data) - window.min.x * std::ptrdiff_t{sizeof(float)} -
                        window.min.y * static_cast<std::ptrdiff_t>(row);
+
   Imf::FrameBuffer buffer;
   buffer.insert(channel, Imf::Slice(Imf::FLOAT, origin, sizeof(float), row));
   file.setFrameBuffer(buffer);

@@ -37,18 +37,21 @@ std::vector<StampedFile> stamped_names(const AzureKinectFile& file, bool depth,
 core::Result<Layout> read_azure_kinect(const fs::path& path, const LayoutOptions& options, core::Log& log) {
   auto file = AzureKinectFile::open(path.string());
   if (!file) return tl::unexpected(file.error());
+
   const AzureKinectFile::Stamps stamps = (*file)->stamps();
   const auto color = stamped_names(**file, false, stamps.color);
   const auto depth = stamped_names(**file, true, stamps.depth);
   Layout layout;
   layout.format = "azure-kinect";
   layout.pairs = pair_by_stamp(color, depth, options.max_pair_gap_s, options.depth_delay_s);
+
   if (layout.pairs.empty()) {
     return core::input_error(color.empty() || depth.empty()
                                  ? fmt::format("{}: holds {} colour and {} depth images; both are needed",
                                                path.string(), color.size(), depth.size())
                                  : no_common_time("colour", color, "depth", depth, options.max_pair_gap_s));
   }
+
   const std::size_t unmatched = color.size() + depth.size() - 2 * layout.pairs.size();
   if (unmatched > 0)
     log.warning(fmt::format("{}: {} images have no partner and are skipped", path.string(), unmatched));

@@ -34,6 +34,7 @@ std::string what_is_there(const fs::path& folder) {
   std::vector<std::string> seen;
   std::map<std::string, std::size_t> endings;
   std::error_code ignored;
+
   for (const auto& entry : fs::directory_iterator(folder, ignored)) {
     const fs::path& path = entry.path();
     if (is_folder(path)) {
@@ -42,15 +43,18 @@ std::string what_is_there(const fs::path& folder) {
       ++endings[path.has_extension() ? path.extension().string() : "without ending"];
     }
   }
+
   std::sort(seen.begin(), seen.end());
   constexpr std::size_t kMost = 8;
   const std::size_t folders = seen.size();
   seen.resize(std::min(folders, kMost));
   if (folders > kMost) seen.push_back(fmt::format("{} more folders", folders - kMost));
+
   for (const auto& [ending, count] : endings) {
     if (seen.size() < 2 * kMost)
       seen.push_back(fmt::format("{} {} file{}", count, ending, count == 1 ? "" : "s"));
   }
+
   std::string text;
   for (const std::string& word : seen) text += (text.empty() ? "" : ", ") + word;
   return text;
@@ -60,6 +64,7 @@ std::string what_is_there(const fs::path& folder) {
 std::string nearest_layout(const fs::path& folder) {
   double best = 0.0;
   std::string text;
+
   for (const LayoutFormat* format : layout_formats()) {
     std::string missing;
     std::size_t there = 0;
@@ -70,6 +75,7 @@ std::string nearest_layout(const fs::path& folder) {
         missing += (missing.empty() ? "" : ", ") + alternatives(part);
       }
     }
+
     const double share = static_cast<double>(there) / static_cast<double>(format->parts.size());
     if (share <= best) continue;
     best = share;
@@ -77,6 +83,7 @@ std::string nearest_layout(const fs::path& folder) {
         fmt::format("the nearest layout is '{}' ({}), of which is missing: {}", format->name, format->program,
                     missing.empty() ? "nothing is found by name; look into its files" : missing);
   }
+
   return text;
 }
 

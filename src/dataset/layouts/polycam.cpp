@@ -39,11 +39,13 @@ std::optional<PolycamFrame> read_polycam_camera(const fs::path& file) {
     whole = whole && value.has_value();
     return value.value_or(0.0);
   };
+
   Eigen::Matrix<double, 3, 4> t;
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 4; ++column)
       t(row, column) = number(fmt::format("t_{}{}", row, column).c_str());
   }
+
   PolycamFrame frame;
   frame.pinhole = {static_cast<int>(std::clamp(number("width"), 0.0, 1e5)),
                    static_cast<int>(std::clamp(number("height"), 0.0, 1e5)),
@@ -51,9 +53,11 @@ std::optional<PolycamFrame> read_polycam_camera(const fs::path& file) {
                    number("fy"),
                    number("cx"),
                    number("cy")};
+
   const Eigen::Matrix3d rotation = t.leftCols<3>();
   const double bent = (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!whole || !(bent < 0.01)) return std::nullopt;
+
   sensor::Camera camera;
   camera.color = frame.pinhole;
   if (!sensor::camera_problem(camera).empty()) return std::nullopt;
@@ -83,6 +87,7 @@ core::Result<Layout> read_polycam(const fs::path& folder, const LayoutOptions& /
   Layout layout{"polycam", {}, std::nullopt};
   geometry::Trajectory poses;
   std::size_t left_out = 0;
+
   for (const PairInfo& pair : pair_numbered(color, depth, kMicroseconds)) {
     const auto frame = read_polycam_camera(cameras / (fs::path(pair.color_file).stem().string() + ".json"));
     if (!frame) {
@@ -94,6 +99,7 @@ core::Result<Layout> read_polycam(const fs::path& folder, const LayoutOptions& /
     layout.frame_cameras.push_back(frame->pinhole);
     poses.push_back({pair.stamp, frame->world_from_camera});
   }
+
   if (layout.pairs.empty()) {
     return core::input_error(
         fmt::format("{}: no number is in images/ ({} images), depth/ ({}) and {}/ at once, with a camera "
@@ -101,11 +107,13 @@ core::Result<Layout> read_polycam(const fs::path& folder, const LayoutOptions& /
                     "({} cannot)",
                     keyframes.string(), color.size(), depth.size(), cameras.filename().string(), left_out));
   }
+
   if (left_out > 0) {
     log.warning(
         fmt::format("{}: {} frames are left out, for their camera files are missing or hold no camera",
                     cameras.string(), left_out));
   }
+
   if (corrected) log.info("polycam: the corrected images and poses are used");
   const fs::path confidence = keyframes / "confidence";
   if (is_folder(confidence)) layout.confidence = confidence.string();

@@ -66,8 +66,10 @@ core::Result<sensor::CameraReading> record3d_camera(const fs::path& file, const 
     return core::input_error(
         fmt::format("{}: no metadata of Record3D: needed are K (9 numbers), w and h", file.string()));
   }
+
   sensor::CameraReading reading;
   reading.program = "Record3D (metadata.json)";
+
   sensor::Camera& camera = reading.camera;
   camera.name = "record3d";
   camera.color = {static_cast<int>(std::clamp(*width, 0.0, 1e5)),
@@ -77,6 +79,7 @@ core::Result<sensor::CameraReading> record3d_camera(const fs::path& file, const 
                   (*k)[6],
                   (*k)[7]};
   camera.fps = json_number(metadata, "fps").value_or(30.0);
+
   if (const std::string wrong = sensor::camera_problem(camera); !wrong.empty())
     return core::input_error(fmt::format("{}: {}", file.string(), wrong));
   return reading;
@@ -103,6 +106,7 @@ core::Result<Layout> read_record3d(const fs::path& folder, const LayoutOptions& 
   const json metadata = read_json_file(place / "metadata.json");
   auto camera = record3d_camera(place / "metadata.json", metadata);
   if (!camera) return tl::unexpected(camera.error());
+
   const auto color = numbered_images(place / "rgb");
   const auto depth = numbered_images(place / "depth");
   Layout layout{"record3d", pair_numbered(color, depth, camera->camera.fps), std::nullopt};
@@ -113,6 +117,7 @@ core::Result<Layout> read_record3d(const fs::path& folder, const LayoutOptions& 
 
   geometry::Trajectory poses;
   std::size_t without = 0;
+
   for (PairInfo& pair : layout.pairs) {
     const long long number = numbers_of(fs::path(pair.color_file).stem().string()).front();
     const json& stamp = element(metadata, "frameTimestamps", number);
@@ -124,6 +129,7 @@ core::Result<Layout> read_record3d(const fs::path& folder, const LayoutOptions& 
       ++without;
     }
   }
+
   const auto earlier = [](const auto& a, const auto& b) { return a.stamp < b.stamp; };
   std::stable_sort(layout.pairs.begin(), layout.pairs.end(), earlier);
   std::stable_sort(poses.begin(), poses.end(), earlier);
@@ -131,12 +137,14 @@ core::Result<Layout> read_record3d(const fs::path& folder, const LayoutOptions& 
     log.warning(fmt::format("{}: {} frames have no pose there", (place / "metadata.json").string(), without));
   add_record3d_cameras(metadata, camera->camera.color, layout);
   layout.camera = std::move(*camera);
+
   const fs::path confidence = place / "confidence";
   if (is_folder(confidence)) layout.confidence = confidence.string();
   if (!poses.empty()) {
     layout.truth = std::move(poses);
     layout.truth_is_odometry = true;
   }
+
   return layout;
 }
 

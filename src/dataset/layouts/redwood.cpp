@@ -60,28 +60,34 @@ geometry::Trajectory read_log(const fs::path& file, const std::vector<PairInfo>&
   geometry::Trajectory truth;
   const auto lines = read_lines(file);
   if (!lines) return truth;
+
   for (std::size_t i = 0; i + 4 < lines->size(); i += 5) {
     const std::optional<double> index = core::to_number((*lines)[i].words[0]);
     Eigen::Matrix4d matrix = Eigen::Matrix4d::Zero();
     bool good = index && *index >= 0.0 && *index < static_cast<double>(pairs.size());
+
     for (std::size_t r = 0; r < 4; ++r) {
       const std::vector<std::string>& words = (*lines)[i + 1 + r].words;
       for (std::size_t c = 0; c < 4 && c < words.size(); ++c) {
         matrix(static_cast<int>(r), static_cast<int>(c)) = core::to_number(words[c]).value_or(NAN);
       }
     }
+
     const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
     const double error =
         (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
     good = good && matrix.allFinite() && error < 0.01;
+
     if (!good) {
       log.warning(fmt::format("{}:{}: is not the pose of a pair; the truth ends here", file.string(),
                               (*lines)[i].number));
       break;
     }
+
     truth.push_back({pairs[static_cast<std::size_t>(*index)].stamp,
                      geometry::Rigid3(Eigen::Quaterniond(rotation), matrix.topRightCorner<3, 1>())});
   }
+
   std::stable_sort(truth.begin(), truth.end(), kByStamp);
   return truth;
 }
@@ -109,6 +115,7 @@ core::Result<Layout> read_redwood(const fs::path& folder, const LayoutOptions& o
         "{}: no {} folder (a Redwood or Open3D recording needs color/, image/ or rgb/, and depth/)",
         folder.string(), colors ? "depth/" : "colour"));
   }
+
   const auto color = list_images(*colors);
   const auto depth = list_images(folder / "depth");
   for (const auto& [images, path] : {std::pair(&color, *colors), std::pair(&depth, folder / "depth")}) {
@@ -117,6 +124,7 @@ core::Result<Layout> read_redwood(const fs::path& folder, const LayoutOptions& o
           fmt::format("{}: no numbered image (looked for .png, .jpg, .pgm, .tiff, .exr)", path.string()));
     }
   }
+
   Layout layout{"redwood", {}, std::nullopt};
   if (all_stamped(color) && all_stamped(depth)) {
     const auto c = by_stamp(color);
@@ -129,6 +137,7 @@ core::Result<Layout> read_redwood(const fs::path& folder, const LayoutOptions& o
   } else {
     layout.pairs = pair_by_number(color, depth, options.fps);
   }
+
   if (layout.pairs.empty()) {
     return core::input_error(
         fmt::format("{}: no number is in both {}/ ({} to {}) and depth/ ({} to {}); colour and depth are "
@@ -136,15 +145,18 @@ core::Result<Layout> read_redwood(const fs::path& folder, const LayoutOptions& o
                     folder.string(), colors->filename().string(), color.begin()->first, color.rbegin()->first,
                     depth.begin()->first, depth.rbegin()->first));
   }
+
   const std::size_t unmatched = color.size() + depth.size() - 2 * layout.pairs.size();
   if (unmatched > 0) {
     log.warning(fmt::format("{}: {} images have no partner and are skipped", folder.string(), unmatched));
   }
+
   std::error_code ignored;
   if (fs::is_regular_file(folder / "trajectory.log", ignored)) {
     geometry::Trajectory truth = read_log(folder / "trajectory.log", layout.pairs, log);
     if (!truth.empty()) layout.truth = std::move(truth);
   }
+
   return layout;
 }
 

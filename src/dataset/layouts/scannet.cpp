@@ -20,6 +20,7 @@ geometry::Trajectory scannet_truth(const fs::path& folder, const std::vector<Pai
                                    core::Log& log) {
   geometry::Trajectory truth;
   std::size_t left_out = 0;
+
   for (const PairInfo& pair : pairs) {
     const fs::path file = folder / "pose" / (fs::path(pair.color_file).stem().string() + ".txt");
     if (!is_file(file)) continue;
@@ -29,11 +30,13 @@ geometry::Trajectory scannet_truth(const fs::path& folder, const std::vector<Pai
       ++left_out;
     }
   }
+
   if (left_out > 0) {
     log.warning(
         fmt::format("{}: {} of {} poses are not finite or no rigid motion, and are left out of the truth",
                     (folder / "pose").string(), left_out, left_out + truth.size()));
   }
+
   return truth;
 }
 

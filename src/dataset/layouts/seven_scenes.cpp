@@ -62,6 +62,7 @@ core::Result<Layout> read_seven_scenes(const fs::path& folder, const LayoutOptio
   Layout layout{"7scenes", {}, std::nullopt};
   geometry::Trajectory truth;
   std::size_t incomplete = 0;
+
   for (const auto& [number, files] : list_frames(folder)) {
     if (files.color.empty() || files.depth.empty()) {
       ++incomplete;
@@ -72,16 +73,19 @@ core::Result<Layout> read_seven_scenes(const fs::path& folder, const LayoutOptio
     if (files.pose.empty()) continue;
     if (const auto pose = read_pose_file(files.pose)) truth.push_back({stamp, *pose});
   }
+
   if (layout.pairs.empty()) {
     return core::input_error(
         fmt::format("{}: no frame with both colour and depth (looked for frame-000000.color.png or .jpg and "
                     "frame-000000.depth.png)",
                     folder.string()));
   }
+
   if (incomplete > 0) {
     log.warning(
         fmt::format("{}: {} frames lack colour or depth and are skipped", folder.string(), incomplete));
   }
+
   if (!truth.empty()) layout.truth = std::move(truth);
   return layout;
 }

@@ -31,17 +31,20 @@ core::Result<Layout> read_stray(const fs::path& folder, const LayoutOptions& /*o
   layout.video = film;
   const fs::path confidence = folder / "confidence";
   if (is_folder(confidence)) layout.confidence = confidence.string();
+
   const auto rows = static_cast<long long>(odometry->rows.size());
   for (const auto& [number, file] : numbered_images(folder / "depth")) {
     if (number >= rows || number >= *frames) continue;
     const double stamp = odometry->rows[static_cast<std::size_t>(number)];
     layout.pairs.push_back({stamp, stamp, video_frame_name(film, number), file});
   }
+
   if (layout.pairs.empty()) {
     return core::input_error(
         fmt::format("{}: no number is in rgb.mp4 ({} frames), odometry.csv ({} rows) and depth/ at once",
                     folder.string(), *frames, rows));
   }
+
   layout.truth = std::move(odometry->poses);
   layout.truth_is_odometry = true;
   return layout;

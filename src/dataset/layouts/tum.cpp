@@ -64,6 +64,7 @@ core::Result<std::vector<StampedFile>> read_list(const fs::path& list, core::Log
   auto lines = read_lines(list);
   if (!lines) return tl::unexpected(lines.error());
   std::vector<StampedFile> files;
+
   for (const TextLine& line : *lines) {
     if (line.words.size() < 2) {
       return core::input_error(
@@ -75,9 +76,11 @@ core::Result<std::vector<StampedFile>> read_list(const fs::path& list, core::Log
     for (std::size_t i = 2; i < line.words.size(); ++i) name += " " + line.words[i];  // a name with blanks
     files.push_back({*stamp, listed_file(list, name), line.number});
   }
+
   if (files.empty()) return core::input_error(fmt::format("{}: names no image", list.string()));
   sort_and_unique(list.string(), files, log);
   if (auto there = check_files(list.string(), files, log); !there) return tl::unexpected(there.error());
+
   return files;
 }
 
@@ -119,6 +122,7 @@ core::Result<std::vector<PairInfo>> read_associations(const fs::path& list, core
   if (auto plain = no_decimal_comma(list); !plain) return tl::unexpected(plain.error());
   auto lines = read_lines(list);
   if (!lines) return tl::unexpected(lines.error());
+
   std::vector<StampedFile> color;
   std::vector<StampedFile> depth;
   std::set<std::string> used;
@@ -127,34 +131,42 @@ core::Result<std::vector<PairInfo>> read_associations(const fs::path& list, core
       return core::input_error(fmt::format("{}:{}: expected 'stamp file stamp file', found {} words",
                                            list.string(), line.number, line.words.size()));
     }
+
     const auto first = read_stamp(list.string(), line, 0);
     if (!first) return tl::unexpected(first.error());
     const auto second = read_stamp(list.string(), line, 2);
     if (!second) return tl::unexpected(second.error());
+
     StampedFile a{*first, listed_file(list, line.words[1]), line.number};
     StampedFile b{*second, listed_file(list, line.words[3]), line.number};
     if (used.count(a.file) + used.count(b.file) > 0) continue;
+
     used.insert({a.file, b.file});
     if (depth_first(line.words[1], line.words[3])) std::swap(a, b);
     color.push_back(std::move(a));
     depth.push_back(std::move(b));
   }
   if (color.empty()) return core::input_error(fmt::format("{}: names no pair of images", list.string()));
+
   if (color.size() < lines->size()) {
     log.warning(fmt::format("{}: {} of {} lines name an image a second time; not used", list.string(),
                             lines->size() - color.size(), lines->size()));
   }
+
   for (const auto* files : {&color, &depth}) {
     if (auto there = check_files(list.string(), *files, log); !there) return tl::unexpected(there.error());
   }
+
   std::vector<PairInfo> pairs;
   for (std::size_t i = 0; i < color.size(); ++i) {
     pairs.push_back({color[i].stamp, depth[i].stamp, color[i].file, depth[i].file});
   }
+
   if (!std::is_sorted(pairs.begin(), pairs.end(), kByStamp)) {
     log.warning(fmt::format("{}: the stamps are not in order; sorted", list.string()));
     std::stable_sort(pairs.begin(), pairs.end(), kByStamp);
   }
+
   return pairs;
 }
 

@@ -22,6 +22,7 @@ std::optional<KeptMessages::Spot> KeptMessages::add(const Bytes& bytes) {
     if (descriptor_ < 0) return std::nullopt;
     unlink(name.c_str());
   }
+
   std::size_t done = 0;
   while (done < bytes.size()) {
     const ssize_t written =
@@ -30,6 +31,7 @@ std::optional<KeptMessages::Spot> KeptMessages::add(const Bytes& bytes) {
     if (written <= 0) return std::nullopt;
     done += static_cast<std::size_t>(written);
   }
+
   const Spot spot{end_, bytes.size()};
   end_ += bytes.size();
   return spot;

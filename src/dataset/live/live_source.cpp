@@ -176,6 +176,7 @@ core::Result<std::unique_ptr<FrameSource>> open_live(const std::string& address,
   how.for_s = live_options.for_s;
   how.stop = live_options.stop;
   how.most_waiting_bytes = live_options.most_waiting_bytes;
+
   auto live = std::make_shared<LiveCamera>();
   live->name = name_of_address(address);
   live->address = address;
@@ -191,11 +192,13 @@ core::Result<std::unique_ptr<FrameSource>> open_live(const std::string& address,
         "topics of one camera with ?color=/TOPIC&depth=/TOPIC",
         address, topics->color.topic->topic.name, topics->depth.topic->topic.name, options.max_pair_gap_s));
   }
+
   live->layout.format = "ros2";
   live->layout.pairs = live->stream->infos();
   live->layout.images = live->stream;
   const auto camera = complete_live_camera(address, options, *chosen, *found, *topics, live->layout, log);
   if (!camera) return tl::unexpected(camera.error());
+
   auto source =
       std::make_unique<LiveSource>(live, *camera, camera->color, std::vector<double>{camera->depth_delay_s});
   const auto doubt = check_depth_scale(*source, address);
@@ -210,6 +213,7 @@ core::Result<std::unique_ptr<FrameSource>> open_live(const std::string& address,
     if (!created) return tl::unexpected(created.error());
     record = std::move(*created);
   }
+
   live->stream->start(std::move(record));
   return source;
 }

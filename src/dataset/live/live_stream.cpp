@@ -64,6 +64,7 @@ void LiveStream::number(const StampPairs::Pair& pair) {
   info.depth_stamp = seconds_of(pair.depth.stamp_ns);
   const std::int64_t us = std::llrint(info.stamp * 1e6);
   const std::size_t bytes = pair.color.bytes->size() + pair.depth.bytes->size();
+
   std::unique_lock lock(mutex_);
   if (last_us_ && us <= *last_us_) {
     if (counts_.backwards++ == 0) {
@@ -73,6 +74,7 @@ void LiveStream::number(const StampPairs::Pair& pair) {
     }
     return;
   }
+
   if (waiting_bytes_ + bytes > options_.most_waiting_bytes) {
     if (counts_.dropped++ == 0) {
       lock.unlock();
@@ -90,6 +92,7 @@ void LiveStream::number(const StampPairs::Pair& pair) {
   if (index == 0) first_taken_ = last_taken_;
   info.color_file = fmt::format("{}{}", color_prefix_, index);
   info.depth_file = fmt::format("{}{}", depth_prefix_, index);
+
   infos_.push_back(std::move(info));
   frames_[index] = {{pair.color.bytes, {}}, {pair.depth.bytes, {}}};
   waiting_bytes_ += bytes;
@@ -139,6 +142,7 @@ void LiveStream::work(const core::StopToken& enough) {
     return enough.stop_requested() || options_.stop.stop_requested() ||
            seconds_since(first_taken_) > options_.for_s;
   };
+
   while (!over()) {
     auto message = stream_->next(kWaitForMessage);
     if (message) {
@@ -147,6 +151,7 @@ void LiveStream::work(const core::StopToken& enough) {
     }
     tell_silence();
   }
+
   while (const auto pair = pairs_.next(true)) number(*pair);
   const std::lock_guard lock(mutex_);
   counts_.lost = stream_->lost();
@@ -212,6 +217,7 @@ core::Result<LiveStream::Place> LiveStream::place_of(const std::string& name) co
   for (const bool color : {true, false}) {
     const std::string& prefix = color ? color_prefix_ : depth_prefix_;
     if (name.compare(0, prefix.size(), prefix) != 0) continue;
+
     std::size_t number = 0;
     std::from_chars(name.data() + prefix.size(), name.data() + name.size(), number);
     const LiveTopic& topic = color ? color_ : depth_;
@@ -219,16 +225,19 @@ core::Result<LiveStream::Place> LiveStream::place_of(const std::string& name) co
     const std::lock_guard lock(mutex_);
     const auto frame = frames_.find(number);
     if (frame == frames_.end()) break;
+
     const Image& image = color ? frame->second.color : frame->second.depth;
     if (image.bytes) {
       place.bytes = *image.bytes;
       return place;
     }
+
     auto kept = image.spot ? kept_.read(*image.spot) : std::nullopt;
     if (!kept) break;
     place.bytes = std::move(*kept);
     return place;
   }
+
   return core::input_error(name + ": has gone by");
 }
 

@@ -56,6 +56,7 @@ std::optional<StampPairs::Pair> StampPairs::next(bool final) {
     const bool same_moment = depth && gap(color_.front(), depth_[*depth]) == 0;
     const bool depth_certain = final || same_moment || (!depth_.empty() && depth_.back().stamp_ns >= when);
     if (!depth_certain) return std::nullopt;
+
     if (!depth) {
       // Nothing near it has come, and nothing can.
       if (!final && depth_.back().stamp_ns < when + reach_us_ * kMicrosecond_ns) return std::nullopt;

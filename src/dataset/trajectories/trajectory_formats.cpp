@@ -71,6 +71,7 @@ core::Result<TrajectoryText> read_text(const std::filesystem::path& file,
   if (!lines) return tl::unexpected(lines.error());
   TrajectoryText text;
   text.file = file.string();
+
   for (const RawLine& line : *lines) {
     std::vector<std::string> words = split_words(line.text, " \t\r\n,;\v\f");
     if (words.empty()) continue;
@@ -79,12 +80,14 @@ core::Result<TrajectoryText> read_text(const std::filesystem::path& file,
       if (header) text.header = header;
       if (header && words.front().front() != '#') continue;
     }
+
     if (words.front().front() == '#') continue;
     if (core::has_decimal_comma(split_words(line.text, " \t\r\n;\v\f")) || eight_cut_in_two(words))
       return text.wrong(line.number, "decimal comma; write numbers with a point");
     if (text.rows.empty()) text.commas = line.text.find(',') != std::string::npos;
     text.rows.push_back({line.number, std::move(words)});
   }
+
   return text;
 }
 
@@ -152,26 +155,32 @@ core::Result<PoseOfRow> read_columns(const TrajectoryText& text, const TextLine&
                                                             : "'stamp tx ty tz qx qy qz qw'",
                                                 row.words.size()));
     }
+
     const std::string& word = row.words[columns.at[i]];
     const std::optional<double> value = core::to_number(word);
     if (!value) return text.wrong(row.number, fmt::format("'{}' is not a number", word));
     n[i] = *value;
   }
+
   stamp = n[0] / units_per_second(text);
   if (!std::all_of(n.begin(), n.end(), [](double v) { return std::isfinite(v); })) return PoseOfRow();
+
   const Eigen::Quaterniond q(n[7], n[4], n[5], n[6]);
   if (q.norm() < kMinQuaternionNorm) return text.wrong(row.number, "the quaternion is zero");
   if (!std::isfinite(q.norm())) return text.wrong(row.number, "the quaternion is too large to be one");
+
   return PoseOfRow(geometry::StampedPose{stamp, {q, Eigen::Vector3d(n[1], n[2], n[3])}});
 }
 
 core::Result<TrajectoryReading> read_trajectory_file(const std::filesystem::path& file) {
   const auto text = read_text(file);
   if (!text) return tl::unexpected(text.error());
+
   const TrajectoryFormat& format = format_of(*text);
   TrajectoryReading reading;
   reading.format = format.name;
   reading.stamped = format.stamped;
+
   for (const TextLine& row : text->rows) {
     auto stamp = static_cast<double>(reading.rows.size());
     const auto pose = format.read_row(*text, row, stamp);
@@ -179,13 +188,16 @@ core::Result<TrajectoryReading> read_trajectory_file(const std::filesystem::path
     reading.rows.push_back(stamp);
     if (*pose) reading.poses.push_back({stamp, (*pose)->world_from_camera});
   }
+
   const std::size_t left_out = reading.rows.size() - reading.poses.size();
   if (left_out > 0 && reading.poses.empty())
     return text->wrong(text->rows.front().number, "no row is finite: there is no pose");
+
   if (left_out > 0) {
     reading.notes.push_back(fmt::format("{} of {} rows hold a value that is not finite and are left out",
                                         left_out, reading.rows.size()));
   }
+
   std::stable_sort(reading.poses.begin(), reading.poses.end(), kByStamp);
   note_shared_stamps(reading);
   return reading;
@@ -224,7 +236,9 @@ core::Result<void> pair_by_number(TrajectoryReading& estimate, TrajectoryReading
         "paired by number",
         estimate.stamped ? "the truth" : "the estimate", estimate.rows.size(), truth.rows.size()));
   }
+
   constexpr double kittis_step_s = 0.1;
+
   const auto restamp = [&](TrajectoryReading& reading, const TrajectoryReading& other) {
     for (geometry::StampedPose& pose : reading.poses) {
       pose.stamp =
@@ -235,6 +249,7 @@ core::Result<void> pair_by_number(TrajectoryReading& estimate, TrajectoryReading
     poses.erase(std::remove_if(poses.begin(), poses.end(), lost), poses.end());
     std::stable_sort(poses.begin(), poses.end(), kByStamp);
   };
+
   const TrajectoryReading unstamped_truth = truth;
   if (!truth.stamped) restamp(truth, estimate);
   if (!estimate.stamped) restamp(estimate, unstamped_truth);

@@ -25,18 +25,22 @@ void put_text_rows(core::OutputFile& out, const cloud::CloudFile& file, char bet
     row += between;
     fmt::format_to(std::back_inserter(row), fmt::runtime(form), value);
   };
+
   for (std::size_t i = 0; i < file.cloud->size(); ++i) {
     const cloud::Point& p = (*file.cloud)[i];
     row.clear();
     for (int k = 0; k < 3; ++k) put(static_cast<double>(p.data[k]) + file.shift[k], "{:.5f}");
+
     for (const std::uint8_t channel : {p.r, p.g, p.b}) put(static_cast<int>(channel), "{}");
     if (file.has_normals) {
       const bool known = p.getNormalVector3fMap().allFinite();
       for (int k = 0; k < 3; ++k) put(known ? p.normal[k] : 0.0F, "{:.4f}");
     }
+
     if (!file.columns.confidence.empty()) put(file.columns.confidence[i], "{:.4g}");
     if (!file.columns.observations.empty()) put(file.columns.observations[i], "{}");
     if (!file.columns.robot.empty()) put(static_cast<int>(file.columns.robot[i]), "{}");
+
     for (const auto& other : file.columns.others) put(other.values[i], "{:.4g}");
     row += '\n';
     out.write(row.data() + 1, row.size() - 1);

@@ -59,11 +59,13 @@ core::Result<GlbData> points_as_glb(MapSource& source) {
 core::Result<GlbData> mesh_as_glb(MapSource& source) {
   const auto mesh = mesh_of(source);
   if (!mesh) return tl::unexpected(mesh.error());
+
   const std::array<std::uint16_t, 256> light = linear_light();
   std::array<const std::vector<float>*, 6> columns{};
   const std::array<const char*, 6> names{"x", "y", "z", "nx", "ny", "nz"};
   for (std::size_t k = 0; k < 6; ++k) columns[k] = mesh->floats(names[k]);
   const auto *red = mesh->bytes("red"), *green = mesh->bytes("green"), *blue = mesh->bytes("blue");
+
   GlbData data;
   for (std::size_t v = 0; v < mesh->vertex_count; ++v) {
     const auto at = [&](std::size_t k) { return (*columns[k])[v]; };
@@ -73,6 +75,7 @@ core::Result<GlbData> mesh_as_glb(MapSource& source) {
     data.normals.push_back(y_up(normal.x(), normal.y(), normal.z()));
     data.colors.push_back({light[(*red)[v]], light[(*green)[v]], light[(*blue)[v]], 65535});
   }
+
   data.triangles = mesh->triangles;
   return data;
 }
@@ -88,12 +91,14 @@ Json glb_json(const GlbData& data, const std::string& name, const std::string& f
   std::array<float, 3> low{}, high{};
   low.fill(std::numeric_limits<float>::max());
   high.fill(std::numeric_limits<float>::lowest());
+
   for (const auto& p : data.positions) {
     for (std::size_t k = 0; k < 3; ++k) {
       low[k] = std::min(low[k], p[k]);
       high[k] = std::max(high[k], p[k]);
     }
   }
+
   Json json;
   json["asset"] = {{"version", "2.0"},
                    {"generator", std::string("plumbline ") + core::version()},
@@ -101,6 +106,7 @@ Json glb_json(const GlbData& data, const std::string& name, const std::string& f
   json["scene"] = 0;
   json["scenes"] = Json::array({{{"nodes", {0}}}});
   json["nodes"] = Json::array({{{"name", name}, {"mesh", 0}}});
+
   std::size_t offset = 0;
   const auto add = [&](std::size_t bytes, int target, Json accessor) {
     accessor["bufferView"] = json["bufferViews"].size();
@@ -110,6 +116,7 @@ Json glb_json(const GlbData& data, const std::string& name, const std::string& f
     offset += bytes;
     return json["accessors"].size() - 1;
   };
+
   json["bufferViews"] = Json::array();
   json["accessors"] = Json::array();
   const std::size_t count = data.positions.size();
@@ -117,19 +124,23 @@ Json glb_json(const GlbData& data, const std::string& name, const std::string& f
   attributes["POSITION"] =
       add(byte_size(data.positions), kVertices,
           {{"componentType", kFloat}, {"count", count}, {"type", "VEC3"}, {"min", low}, {"max", high}});
+
   if (!data.normals.empty()) {
     attributes["NORMAL"] = add(byte_size(data.normals), kVertices,
                                {{"componentType", kFloat}, {"count", count}, {"type", "VEC3"}});
   }
+
   attributes["COLOR_0"] =
       add(byte_size(data.colors), kVertices,
           {{"componentType", kShort}, {"normalized", true}, {"count", count}, {"type", "VEC4"}});
+
   Json primitive = {{"attributes", attributes}, {"material", 0}, {"mode", data.triangles.empty() ? 0 : 4}};
   if (!data.triangles.empty()) {
     primitive["indices"] =
         add(byte_size(data.triangles), kIndices,
             {{"componentType", kInt}, {"count", 3 * data.triangles.size()}, {"type", "SCALAR"}});
   }
+
   json["meshes"] = Json::array({{{"primitives", Json::array({primitive})}}});
   json["materials"] =
       Json::array({{{"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", 1.0}}},
@@ -144,9 +155,11 @@ core::Result<ExportSummary> write_glb(MapSource& source, const std::filesystem::
   const bool mesh = source.request().content == Content::kMesh;
   const auto data = mesh ? mesh_as_glb(source) : points_as_glb(source);
   if (!data) return tl::unexpected(data.error());
+
   const Json json = glb_json(*data, source.name(), source.frame_text());
   std::string text = json.dump();
   text.append((4 - text.size() % 4) % 4, ' ');
+
   // All parts are whole words.
   const std::size_t binary = json["buffers"][0]["byteLength"].get<std::size_t>();
   const std::size_t whole = 12 + 8 + text.size() + 8 + binary;
@@ -162,6 +175,7 @@ core::Result<ExportSummary> write_glb(MapSource& source, const std::filesystem::
                                        static_cast<std::uint32_t>(text.size())});
   out.write("JSON");
   out.write(text);
+
   out.put(static_cast<std::uint32_t>(binary));
   out.write(std::string_view("BIN\0", 4));
   out.write(data->positions.data(), byte_size(data->positions));
@@ -169,6 +183,7 @@ core::Result<ExportSummary> write_glb(MapSource& source, const std::filesystem::
   out.write(data->colors.data(), byte_size(data->colors));
   out.write(data->triangles.data(), byte_size(data->triangles));
   if (auto written = out.commit(); !written) return tl::unexpected(written.error());
+
   ExportSummary summary;
   summary.written = {output};
   if (const auto up = source.need_upright(output.string()); !up) summary.notes.push_back(up.error().message);

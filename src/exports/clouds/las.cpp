@@ -127,6 +127,7 @@ void put_las_header(core::OutputFile& out, const LasLayout& layout, const LasSte
   out.put(std::uint8_t{1});
   out.put(std::uint8_t{4});
   put_fixed<32>(out, "RGB-D SLAM");
+
   put_fixed<32>(out, std::string("plumbline ") + core::version());
   out.put(std::uint16_t{0});  // day and year: same map, same bytes
   out.put(std::uint16_t{0});
@@ -135,9 +136,11 @@ void put_las_header(core::OutputFile& out, const LasLayout& layout, const LasSte
   out.put(layout.vlrs);
   out.put(std::uint8_t{7});
   out.put(layout.point_size);
+
   for (int i = 0; i < 6; ++i) out.put(std::uint32_t{0});  // legacy counts
   out.put(std::array<double, 3>{kLasScale_m, kLasScale_m, kLasScale_m});
   out.put(std::array<double, 3>{steps.offset.x(), steps.offset.y(), steps.offset.z()});
+
   for (int k = 0; k < 3; ++k) out.put(std::array<double, 2>{box.max()[k], box.min()[k]});
   out.put(std::uint64_t{0});  // waveforms
   out.put(std::uint64_t{0});  // extended records
@@ -184,30 +187,36 @@ core::Result<ExportSummary> write_las(MapSource& source, const std::filesystem::
   Eigen::AlignedBox3d box;
   for (const cloud::Point& p : *file.cloud) box.extend(p.getVector3fMap().cast<double>() + file.shift);
   const LasSteps steps{box.center().array().round()};
+
   if (box.sizes().maxCoeff() / kLasScale_m > std::numeric_limits<std::int32_t>::max()) {
     return core::input_error(
         fmt::format("{}: the cloud is {:.0f} m wide; LAS with a step of 0.1 mm holds 214 km", output.string(),
                     box.sizes().maxCoeff()));
   }
+
   const Eigen::AlignedBox3d rounded(steps.place(steps.of(box.min())), steps.place(steps.of(box.max())));
 
   const LasLayout layout = layout_of_las(file.columns, *reference);
   core::OutputFile out(output);
   put_las_header(out, layout, steps, rounded, file.cloud->size());
+
   if (!layout.wkt.empty()) {
     put_vlr_header(out, "LASF_Projection", 2112, layout.wkt.size(), "OGC coordinate system WKT");
     out.write(layout.wkt);
   }
+
   if (!layout.extras.empty()) put_extra_records(out, layout.extras);
   put_las_points(out, file, steps);
   ExportSummary summary;
   if (!file.has_color) summary.notes.emplace_back("the cloud has no colour: all points are white");
   if (auto written = out.commit(); !written) return tl::unexpected(written.error());
+
   summary.written = {output};
   if (*reference) {
     if (auto beside = write_georeference(output, **reference); !beside) return tl::unexpected(beside.error());
     summary.notes.push_back(fmt::format("in {} (EPSG:{})", (*reference)->name, (*reference)->epsg));
   }
+
   return summary;
 }
 

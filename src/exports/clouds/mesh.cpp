@@ -30,11 +30,13 @@ core::Result<cloud::PlyData> mesh_of(MapSource& source) {
         "{}: a mesh needs normals, which this cloud has not; run a filter chain with normals over it first",
         source.request().input.string()));
   }
+
   constexpr double kDefault_m = 0.02;
   const ExportOptions& options = source.options();
   cloud::MeshOptions mesh_options;
   mesh_options.resolution_m = options.resolution_m > 0.0 ? options.resolution_m : kDefault_m;
   mesh_options.reach_m = options.reach_m;
+
   core::Result<cloud::PlyData> mesh;
   const auto work = [&] { mesh = cloud::make_mesh(*(*cloud)->cloud, mesh_options); };
   if (source.request().quietly) {
@@ -42,6 +44,7 @@ core::Result<cloud::PlyData> mesh_of(MapSource& source) {
   } else {
     work();
   }
+
   if (mesh) mesh->shift = {(*cloud)->shift.x(), (*cloud)->shift.y(), (*cloud)->shift.z()};
   return mesh;
 }

@@ -33,9 +33,11 @@ core::Result<ExportSummary> write_ply_cloud(MapSource& source, const std::filesy
   if (!reference) return tl::unexpected(reference.error());
   const auto cloud = source.cloud();
   if (!cloud) return tl::unexpected(cloud.error());
+
   ExportSummary summary;
   summary.written = {output};
   std::vector<std::string> comments;
+
   if (*reference) {
     comments = {fmt::format("frame: {} (EPSG:{}); x east, y north, z up, metres", (*reference)->name,
                             (*reference)->epsg)};
@@ -43,12 +45,14 @@ core::Result<ExportSummary> write_ply_cloud(MapSource& source, const std::filesy
   } else if (source.options().ascii) {
     comments = {source.frame_text()};
   }
+
   const cloud::CloudFile file = *reference ? to_world(**cloud, **reference) : **cloud;
   auto written = source.options().ascii
                      ? write_ascii_ply(output, file, comments)
                      : cloud::write_ply(output, *file.cloud, file.columns, file.shift, comments);
   if (written && *reference) written = write_georeference(output, **reference);
   if (!written) return tl::unexpected(written.error());
+
   return summary;
 }
 

@@ -62,6 +62,7 @@ class RayCounter {
     const int steps = std::abs(static_cast<int>(std::floor(b.x())) - cell.x()) +
                       std::abs(static_cast<int>(std::floor(b.y())) - cell.y());
     Eigen::Vector2d next, between;
+
     Eigen::Vector2i towards;
     for (int k = 0; k < 2; ++k) {
       towards[k] = way[k] > 0.0 ? 1 : -1;
@@ -69,6 +70,7 @@ class RayCounter {
       const double border = way[k] > 0.0 ? cell[k] + 1.0 - a[k] : a[k] - cell[k];
       next[k] = way[k] == 0.0 ? 1e300 : border * between[k];
     }
+
     for (int step = 0;; ++step) {
       count(cell);
       if (step == steps) return;
@@ -100,6 +102,7 @@ core::Result<Grid> grid_over(const cloud::CloudFile& file, double resolution_m) 
     box.extend((p.getVector3fMap().cast<double>() + file.shift).head<2>().eval());
   Grid grid;
   grid.resolution_m = resolution_m;
+
   const Eigen::Array2d low = (box.min().array() / resolution_m).floor() - 2.0;
   const Eigen::Array2d high = (box.max().array() / resolution_m).floor() + 3.0;
   if ((high - low).prod() > kMostCells) {
@@ -107,6 +110,7 @@ core::Result<Grid> grid_over(const cloud::CloudFile& file, double resolution_m) 
         fmt::format("--resolution: cells of {} m would be {:.0f} million; choose larger ones, or a --box",
                     resolution_m, (high - low).prod() / 1e6));
   }
+
   grid.origin = low * resolution_m;
   grid.columns = static_cast<int>(high.x() - low.x());
   grid.rows = static_cast<int>(high.y() - low.y());
@@ -149,6 +153,7 @@ core::Result<Grid> make_grid(MapSource& source) {
     return {};
   });
   if (!seen) return tl::unexpected(seen.error());
+
   const std::vector<int> points = points_in_cells(*grid, **cloud, low_m, high_m);
   for (std::size_t i = 0; i < grid->cells.size(); ++i) {
     if (points[i] >= kGridFewestPoints) {
@@ -157,6 +162,7 @@ core::Result<Grid> make_grid(MapSource& source) {
       grid->cells[i] = GridCell::kFree;
     }
   }
+
   return grid;
 }
 

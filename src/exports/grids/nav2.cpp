@@ -32,12 +32,14 @@ core::Result<void> write_pgm(const std::filesystem::path& file, const Grid& grid
 core::Result<ExportSummary> write_nav2(MapSource& source, const std::filesystem::path& output) {
   const auto grid = make_grid(source);
   if (!grid) return tl::unexpected(grid.error());
+
   std::filesystem::path image = output;
   std::filesystem::path yaml = output;
   image.replace_extension(".pgm");
   yaml.replace_extension(".yaml");
   if (auto written = write_pgm(image, *grid, source.frame_text()); !written)
     return tl::unexpected(written.error());
+
   const auto written = core::write_file(
       yaml, fmt::format("# {}\n# occupied: between {:g} and {:g} m over the floor\nimage: {}\nmode: trinary\n"
                         "resolution: {:g}\norigin: [{:.6f}, {:.6f}, 0]\nnegate: 0\noccupied_thresh: 0.65\n"
@@ -45,6 +47,7 @@ core::Result<ExportSummary> write_nav2(MapSource& source, const std::filesystem:
                         source.frame_text(), source.options().heights[0], source.options().heights[1],
                         image.filename().string(), grid->resolution_m, grid->origin.x(), grid->origin.y()));
   if (!written) return tl::unexpected(written.error());
+
   ExportSummary summary;
   summary.written = {yaml, image};
   return summary;

@@ -13,8 +13,10 @@ core::Result<ExportSummary> write_octomap(MapSource& source, const std::filesyst
   constexpr double kDefault_m = 0.05;
   const auto cloud = source.cloud();
   if (!cloud) return tl::unexpected(cloud.error());
+
   const auto& octomap = core::part<OctreeFunctions>();
   if (!octomap) return tl::unexpected(octomap.error());
+
   OctreeWork work;
   work.resolution_m = source.options().resolution_m > 0.0 ? source.options().resolution_m : kDefault_m;
   work.color = output.extension() == ".ot";
@@ -22,9 +24,11 @@ core::Result<ExportSummary> write_octomap(MapSource& source, const std::filesyst
   work.cloud = *cloud;
   work.box = source.selected();
   work.views = [&](const auto& take) { return for_each_view(source, take); };
+
   const auto bytes = (*octomap)->make(work);
   if (!bytes) return tl::unexpected(bytes.error());
   if (auto written = core::write_file(output, *bytes); !written) return tl::unexpected(written.error());
+
   ExportSummary summary;
   summary.written = {output};
   return summary;

@@ -40,6 +40,7 @@ core::Result<void> for_each_view(const MapSource& source,
                                  const std::function<core::Result<void>(const ViewRays&)>& take) {
   const auto store = source.store("free space");
   if (!store) return tl::unexpected(store.error());
+
   const auto views = (*store)->views();
   if (!views) return tl::unexpected(views.error());
   if (views->size() == 0) {
@@ -47,11 +48,13 @@ core::Result<void> for_each_view(const MapSource& source,
         fmt::format("{}: the map holds no clouds of its views, so that free space is not known",
                     source.request().input.string()));
   }
+
   constexpr std::size_t kAtOnce = 16;
   for (std::size_t first = 0; first < views->size(); first += kAtOnce) {
     const std::size_t count = std::min(kAtOnce, views->size() - first);
     std::vector<ViewRays> rays(count);
     std::vector<std::optional<core::Error>> wrong(count);
+
     source.executor().parallel_for(count, [&](std::size_t k) {
       const auto cloud = views->read(first + k);
       if (!cloud) {
@@ -60,12 +63,15 @@ core::Result<void> for_each_view(const MapSource& source,
       }
       rays[k] = rays_of(**cloud, source.world_from_map() * views->world_from_camera[first + k]);
     });
+
     for (std::size_t k = 0; k < count; ++k) {
       if (wrong[k]) return tl::unexpected(*wrong[k]);
       if (auto taken = take(rays[k]); !taken) return taken;
     }
+
     source.progress(first + count, views->size());
   }
+
   return {};
 }
 

@@ -48,6 +48,7 @@ std::vector<float> distances(const viewer::Points& points, const viewer::Points&
       out[i] = std::sqrt(squared);
     }
   });
+
   return out;
 }
 
@@ -67,6 +68,7 @@ std::optional<geometry::Rigid3> first_from_second(const std::vector<ExportPose>&
     wanted.stamp -= kSame_s;
     const auto found = std::lower_bound(first.begin(), first.end(), wanted, earlier);
     if (found == first.end() || found->robot != pose.robot || found->stamp > pose.stamp + kSame_s) continue;
+
     // With the places a metre along each axis, so that a straight path tells a turn about itself as well.
     for (int k = -1; k < 3; ++k) {
       const Eigen::Vector3d way =
@@ -75,6 +77,7 @@ std::optional<geometry::Rigid3> first_from_second(const std::vector<ExportPose>&
       to.push_back(found->world_from_camera * way);
     }
   }
+
   if (from.size() < 12) return std::nullopt;
   return geometry::align_points(from, to);
 }

@@ -30,6 +30,7 @@ std::string encode_jpeg(const cv::Mat& bgr, int quality) {
   unsigned long size = 0;
   info.err = jpeg_std_error(&errors.base);
   errors.base.error_exit = &leave_jpeg;
+
   if (setjmp(errors.jump) != 0) {
     jpeg_destroy_compress(&info);
     std::free(bytes);

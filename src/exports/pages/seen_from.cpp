@@ -72,10 +72,12 @@ core::Result<BestByCell> best_by_cell(const MapSource& source, const maps::Store
                                       const std::vector<std::pair<std::size_t, std::size_t>>& chosen) {
   constexpr std::size_t kAtOnce = 16;
   BestByCell best;
+
   for (std::size_t first = 0; first < chosen.size(); first += kAtOnce) {
     const std::size_t count = std::min(kAtOnce, chosen.size() - first);
     std::vector<std::vector<CellSight>> sights(count);
     std::vector<std::optional<core::Error>> wrong(count);
+
     source.executor().parallel_for(count, [&](std::size_t k) {
       const std::size_t view = chosen[first + k].first;
       const auto cloud = views.read(view);

@@ -131,10 +131,12 @@ void add_paths(const MapSource& source, viewer::Scene& scene) {
   constexpr double kTurn = 0.087;
   const auto poses = source.poses(false);
   if (!poses) return;
+
   for (std::size_t i = 0; i < poses->size(); ++i) {
     const ExportPose& pose = (*poses)[i];
     const bool begins = scene.paths.empty() || scene.paths.back().robot != pose.robot;
     if (begins) scene.paths.push_back({pose.robot, pose.robot_name, {}, {}});
+
     viewer::CameraPath& path = scene.paths.back();
     const bool ends = i + 1 == poses->size() || (*poses)[i + 1].robot != pose.robot;
     if (!begins && !ends) {
@@ -143,6 +145,7 @@ void add_paths(const MapSource& source, viewer::Scene& scene) {
       const double cosine = pose.world_from_camera.rotation.col(2).dot(before.rotation.col(2));
       if (moved < kStep_m && cosine > std::cos(kTurn)) continue;
     }
+
     path.stamps.push_back(pose.stamp);
     path.world_from_camera.push_back(pose.world_from_camera);
   }
@@ -152,6 +155,7 @@ void add_paths(const MapSource& source, viewer::Scene& scene) {
 core::Result<void> add_keyframes(const MapSource& source, const cloud::CloudFile& file, MapView& view) {
   const auto poses = source.poses(true);
   if (!poses) return {};
+
   std::map<core::KeyframeId, std::size_t> numbers;
   std::map<core::KeyframeId, Eigen::Vector3d> places;
   for (const ExportPose& pose : *poses) {
@@ -161,6 +165,7 @@ core::Result<void> add_keyframes(const MapSource& source, const cloud::CloudFile
     }
     view.scene.keyframes.push_back({pose.robot, pose.stamp, pose.world_from_camera, {}});
   }
+
   add_thumbnails(source, view);
   if (!source.has_store()) return {};
 
@@ -210,9 +215,11 @@ void add_plan(MapSource& source, MapView& view) {
     }
     scene.walls.emplace_back(at(wall.at(from)), at(wall.at(wall.s1)));
   }
+
   for (const WallDoor& door : plan->doors)
     scene.doors.emplace_back(at(0.5 * (door.jambs[0] + door.far_jambs[0])),
                              at(0.5 * (door.jambs[1] + door.far_jambs[1])));
+
   for (const WallRoom& room : plan->rooms)
     scene.rooms.emplace_back(at(room.label), fmt::format("{:.2f} m²", room.area_m2));
   scene.plan_height_m = height;
@@ -265,8 +272,10 @@ core::Result<ExportSummary> write_view(MapSource& source, const std::filesystem:
         "{}: exists and is no page of a map; name another file (only such pages are ever replaced)",
         output.string()));
   }
+
   auto view = view_of(source);
   if (!view) return tl::unexpected(view.error());
+
   viewer::Cost cost;
   const std::string page = viewer::page(view->scene, kViewGenerator, &cost);
   if (auto written = core::write_file(output, page); !written) return tl::unexpected(written.error());
@@ -277,6 +286,7 @@ core::Result<ExportSummary> write_view(MapSource& source, const std::filesystem:
   const auto each = [&](std::size_t bytes) {
     return static_cast<double>(bytes) / static_cast<double>(std::max<std::size_t>(1, cost.points));
   };
+
   summary.notes.push_back(fmt::format(
       "{} points{}, {:.1f} MB: {:.2f} bytes a point for place and colour, {:.2f} for normals, "
       "{:.2f} for {} further layers",

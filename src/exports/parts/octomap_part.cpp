@@ -24,6 +24,7 @@ void add_free(const ViewRays& view, const Eigen::AlignedBox3d& box, Tree& tree) 
   octomap::KeySet free;
   octomap::KeyRay ray;
   octomap::OcTreeKey key;
+
   for (const Eigen::Vector3f& end : view.ends) {
     const Eigen::Vector3d way = end.cast<double>() - view.origin;
     const double length_m = way.norm();
@@ -34,6 +35,7 @@ void add_free(const ViewRays& view, const Eigen::AlignedBox3d& box, Tree& tree) 
     free.insert(ray.begin(), ray.end());
     free.insert(key);
   }
+
   for (const octomap::OcTreeKey& cell : free) {
     const octomap::point3d at = tree.keyToCoord(cell);
     if (box.contains(Eigen::Vector3d(at.x(), at.y(), at.z()))) tree.updateNode(cell, false, true);
@@ -81,17 +83,20 @@ core::Result<std::string> make_octree(const OctreeWork& work) {
       to.averageNodeColor(key, p.r, p.g, p.b);
     };
     if (auto filled = fill(work, tree, paint); !filled) return tl::unexpected(filled.error());
+
     put_head("# Octomap OcTree file", work, tree, bytes);
     tree.writeData(bytes);
   } else {
     octomap::OcTree tree(work.resolution_m);
     const auto nothing = [](octomap::OcTree&, const octomap::OcTreeKey&, const cloud::Point&) {};
     if (auto filled = fill(work, tree, nothing); !filled) return tl::unexpected(filled.error());
+
     tree.toMaxLikelihood();
     tree.prune();
     put_head("# Octomap OcTree binary file", work, tree, bytes);
     tree.writeBinaryData(bytes);
   }
+
   return bytes.str();
 }
 

@@ -63,6 +63,7 @@ core::Result<std::string> make_pdf(const Drawing& drawing, const DrawingSheet& s
   for (const std::string& note : drawing.notes) subject += "; " + note;
   cairo_pdf_surface_set_metadata(surface.get(), CAIRO_PDF_METADATA_TITLE, drawing.title.c_str());
   cairo_pdf_surface_set_metadata(surface.get(), CAIRO_PDF_METADATA_SUBJECT, subject.c_str());
+
   // Same map, same bytes.
   cairo_pdf_surface_set_metadata(surface.get(), CAIRO_PDF_METADATA_CREATE_DATE, "2000-01-01T00:00:00Z");
   const std::unique_ptr<cairo_t, FreeCairo> cairo(cairo_create(surface.get()));
@@ -70,6 +71,7 @@ core::Result<std::string> make_pdf(const Drawing& drawing, const DrawingSheet& s
   cairo_set_line_cap(cairo.get(), CAIRO_LINE_CAP_ROUND);
   cairo_set_line_join(cairo.get(), CAIRO_LINE_JOIN_ROUND);
   cairo_select_font_face(cairo.get(), "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+
   for (std::size_t layer = 0; layer < drawing.layers.size(); ++layer) {
     set_color(cairo.get(), drawing.layers[layer].color);
     cairo_set_line_width(cairo.get(), drawing.layers[layer].width_mm);
@@ -80,10 +82,12 @@ core::Result<std::string> make_pdf(const Drawing& drawing, const DrawingSheet& s
       if (text.layer == layer) draw_text(cairo.get(), text, sheet);
     }
   }
+
   cairo_surface_finish(surface.get());
   const cairo_status_t status = cairo_surface_status(surface.get());
   if (status != CAIRO_STATUS_SUCCESS)
     return core::output_error(fmt::format("PDF: {}", cairo_status_to_string(status)));
+
   return bytes;
 }
 

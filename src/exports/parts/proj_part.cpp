@@ -63,6 +63,7 @@ core::Result<void> place_map(double latitude, double longitude, double heading, 
   const Pj given(proj_create_crs_to_crs(context.get(), "EPSG:4326",
                                         fmt::format("EPSG:{}", reference.epsg).c_str(), nullptr));
   const Pj from_degrees(given ? proj_normalize_for_visualization(context.get(), given.get()) : nullptr);
+
   const Pj globe(proj_create(context.get(), "EPSG:4326"));
   const auto fail = [&] {
     return core::usage_error(
@@ -74,12 +75,14 @@ core::Result<void> place_map(double latitude, double longitude, double heading, 
   const PJ_COORD here = proj_trans(from_degrees.get(), PJ_FWD, proj_coord(longitude, latitude, 0.0, 0.0));
   const PJ_COORD north =
       proj_trans(from_degrees.get(), PJ_FWD, proj_coord(longitude, latitude + kStep, 0.0, 0.0));
+
   const double true_m =
       proj_lp_dist(globe.get(), proj_coord(longitude * kRadians, latitude * kRadians, 0.0, 0.0),
                    proj_coord(longitude * kRadians, (latitude + kStep) * kRadians, 0.0, 0.0));
   const double east_m = north.xy.x - here.xy.x;
   const double north_m = north.xy.y - here.xy.y;
   if (!std::isfinite(here.xy.x + here.xy.y + east_m + north_m) || !(true_m > 0.0)) return fail();
+
   reference.origin = {here.xy.x, here.xy.y, 0.0};
   reference.scale = std::hypot(east_m, north_m) / true_m;
   reference.turn = std::atan2(north_m, east_m) - heading * kRadians;

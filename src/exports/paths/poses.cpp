@@ -31,17 +31,21 @@ core::Result<ExportSummary> write_poses(MapSource& source, const std::filesystem
   if (!store) return tl::unexpected(store.error());
   const auto body_from_camera = body_from_camera_of(source.options());
   if (!body_from_camera) return tl::unexpected(body_from_camera.error());
+
   const geometry::Rigid3 camera_from_body = body_from_camera->inverse();
   const auto poses = source.poses(source.request().content == Content::kKeyframes);
   if (!poses) return tl::unexpected(poses.error());
+
   const auto state = (*store)->fusion_state();
   if (!state) return tl::unexpected(state.error());
+
   std::vector<std::int32_t> robots;
   std::vector<double> stamps;
   for (const ExportPose& pose : *poses) {
     robots.push_back(pose.robot);
     stamps.push_back(pose.stamp);
   }
+
   const std::vector<geometry::Matrix6d> covariances = state->covariances_of(robots, stamps);
 
   core::OutputFile out(output);
@@ -49,10 +53,12 @@ core::Result<ExportSummary> write_poses(MapSource& source, const std::filesystem
       fmt::format("# {}\n# covariance of position (m) and of turns about the world's axes (rad), beside the "
                   "first keyframe\n",
                   source.frame_text()));
+
   std::string head = "robot,keyframe,stamp,x,y,z,qx,qy,qz,qw";
   for (int r = 0; r < 6; ++r) {
     for (int c = r; c < 6; ++c) head += fmt::format(",cov_{}_{}", kPosesAxes[r], kPosesAxes[c]);
   }
+
   out.write(head + "\n");
   for (std::size_t i = 0; i < poses->size(); ++i) {
     const ExportPose& pose = (*poses)[i];
@@ -62,6 +68,7 @@ core::Result<ExportSummary> write_poses(MapSource& source, const std::filesystem
         "{},{},{:.6f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f}", pose.robot_name,
         pose.keyframe.valid() ? std::to_string(pose.keyframe.index) : "", pose.stamp, body.translation.x(),
         body.translation.y(), body.translation.z(), q.x(), q.y(), q.z(), q.w());
+
     if (covariances.empty()) {
       row += std::string(21, ',');
     } else {
@@ -70,16 +77,20 @@ core::Result<ExportSummary> write_poses(MapSource& source, const std::filesystem
         for (int c = r; c < 6; ++c) row += fmt::format(",{:.6e}", world(r, c));
       }
     }
+
     out.write(row + "\n");
   }
+
   if (auto written = out.commit(); !written) return tl::unexpected(written.error());
   ExportSummary summary;
   summary.written = {output};
+
   if (covariances.empty()) {
     summary.notes.emplace_back(
         "the map holds no covariances, so their columns are empty: it was interrupted, or made without the "
         "stage refine");
   }
+
   return summary;
 }
 

@@ -40,6 +40,7 @@ core::Result<ExportSummary> write_robot_files(const MapSource& source, const std
                                               const std::string& ending, const WritePaths& write) {
   const auto paths = paths_of(source);
   if (!paths) return tl::unexpected(paths.error());
+
   ExportSummary summary;
   if (output.has_extension()) {
     core::OutputFile out(output);
@@ -49,6 +50,7 @@ core::Result<ExportSummary> write_robot_files(const MapSource& source, const std
     return summary;
   }
   if (auto made = core::make_folder(output); !made) return tl::unexpected(made.error());
+
   for (const auto& path : *paths) {
     const std::string& robot = path.front().robot_name;
     const std::filesystem::path file = output / ((robot.empty() ? source.name() : robot) + ending);
@@ -57,6 +59,7 @@ core::Result<ExportSummary> write_robot_files(const MapSource& source, const std
     if (auto written = out.commit(); !written) return tl::unexpected(written.error());
     summary.written.push_back(file);
   }
+
   return summary;
 }
 

@@ -44,6 +44,7 @@ core::Result<ExportSummary> write_kitti(MapSource& source, const std::filesystem
                     "gets a file for each",
                     output.string(), paths->size()));
   }
+
   return write_robot_files(source, output, ".kitti", [](core::OutputFile& out, const auto& all) {
     for (const auto& path : all) {
       for (const ExportPose& pose : path) {
@@ -78,9 +79,11 @@ core::Result<ExportSummary> write_euroc(MapSource& source, const std::filesystem
 core::Result<ExportSummary> write_path(MapSource& source, const std::filesystem::path& output) {
   const auto paths = paths_of(source);
   if (!paths) return tl::unexpected(paths.error());
+
   std::array<std::vector<float>, 3> xyz;
   cloud::PlyData data;
   data.comments = {"plumbline, metres", source.frame_text()};
+
   std::uint32_t index = 0;
   for (const auto& path : *paths) {
     for (std::size_t i = 0; i < path.size(); ++i, ++index) {
@@ -89,10 +92,12 @@ core::Result<ExportSummary> write_path(MapSource& source, const std::filesystem:
       if (i > 0) data.edges.push_back({index - 1, index});
     }
   }
+
   data.add("x", std::move(xyz[0]));
   data.add("y", std::move(xyz[1]));
   data.add("z", std::move(xyz[2]));
   if (auto written = cloud::write_ply(output, data); !written) return tl::unexpected(written.error());
+
   ExportSummary summary;
   summary.written = {output};
   return summary;

@@ -53,6 +53,7 @@ std::vector<std::vector<ColmapSpot>> spots_of(const maps::Map& map, const Colmap
 core::Result<void> write_colmap_binary(const std::filesystem::path& folder, const ColmapModel& model) {
   core::OutputFile cameras(folder / "cameras.bin");
   cameras.put(std::uint64_t{model.robots.size()});
+
   for (const maps::RobotInfo& robot : model.robots) {
     const sensor::Pinhole& c = robot.camera.color;
     cameras.put(camera_id(robot.number));
@@ -61,8 +62,10 @@ core::Result<void> write_colmap_binary(const std::filesystem::path& folder, cons
                                              static_cast<std::uint64_t>(c.height)});
     cameras.put(std::array<double, 4>{c.fx, c.fy, c.cx + kHalfPixel, c.cy + kHalfPixel});
   }
+
   core::OutputFile images(folder / "images.bin");
   images.put(std::uint64_t{model.pictures.size()});
+
   for (std::size_t i = 0; i < model.pictures.size(); ++i) {
     const geometry::Rigid3 pose = model.pictures[i].pose.world_from_camera.inverse();
     const Eigen::Quaterniond q = pose.quaternion();
@@ -73,13 +76,16 @@ core::Result<void> write_colmap_binary(const std::filesystem::path& folder, cons
     images.write(model.pictures[i].name + ".png");
     images.put('\0');
     images.put(std::uint64_t{model.spots[i].size()});
+
     for (const ColmapSpot& spot : model.spots[i]) {
       images.put(std::array<double, 2>{spot.x, spot.y});
       images.put(spot.point);
     }
   }
+
   core::OutputFile points(folder / "points3D.bin");
   points.put(std::uint64_t{model.points.size()});
+
   for (std::size_t p = 0; p < model.points.size(); ++p) {
     const ModelPoint& point = model.points[p];
     points.put(std::uint64_t{p + 1});
@@ -87,11 +93,13 @@ core::Result<void> write_colmap_binary(const std::filesystem::path& folder, cons
     points.put(point.color);
     points.put(point.error_px);
     points.put(std::uint64_t{point.track.size()});
+
     for (const ModelPoint::Sight& sight : point.track) {
       points.put(static_cast<std::uint32_t>(sight.picture + 1));
       points.put(static_cast<std::uint32_t>(sight.feature));
     }
   }
+
   if (auto done = cameras.commit(); !done) return done;
   if (auto done = images.commit(); !done) return done;
   return points.commit();
@@ -106,27 +114,33 @@ core::Result<void> write_colmap_text(const std::filesystem::path& folder, const 
     cameras.write(fmt::format("{} PINHOLE {} {} {} {} {} {}\n", camera_id(robot.number), c.width, c.height,
                               c.fx, c.fy, c.cx + kHalfPixel, c.cy + kHalfPixel));
   }
+
   core::OutputFile images(folder / "images.txt");
   images.write(
       fmt::format("# {}\n# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n"
                   "# POINTS2D[] as (X, Y, POINT3D_ID)\n",
                   frame));
+
   for (std::size_t i = 0; i < model.pictures.size(); ++i) {
     const geometry::Rigid3 pose = model.pictures[i].pose.world_from_camera.inverse();
     const Eigen::Quaterniond q = pose.quaternion();
     const Eigen::Vector3d& t = pose.translation;
     images.write(fmt::format("{} {} {} {} {} {} {} {} {} {}.png\n", i + 1, q.w(), q.x(), q.y(), q.z(), t.x(),
                              t.y(), t.z(), camera_id(model.pictures[i].pose.robot), model.pictures[i].name));
+
     const char* between = "";
     for (const ColmapSpot& spot : model.spots[i]) {
       images.write(spot.point == kNoPoint ? fmt::format("{}{} {} -1", between, spot.x, spot.y)
                                           : fmt::format("{}{} {} {}", between, spot.x, spot.y, spot.point));
       between = " ";
     }
+
     images.write("\n");
   }
+
   core::OutputFile points(folder / "points3D.txt");
   points.write("# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n");
+
   for (std::size_t p = 0; p < model.points.size(); ++p) {
     const ModelPoint& point = model.points[p];
     const Eigen::Vector3d& x = point.position;
@@ -136,6 +150,7 @@ core::Result<void> write_colmap_text(const std::filesystem::path& folder, const 
       points.write(fmt::format(" {} {}", sight.picture + 1, sight.feature));
     points.write("\n");
   }
+
   if (auto done = cameras.commit(); !done) return done;
   if (auto done = images.commit(); !done) return done;
   return points.commit();
@@ -144,10 +159,12 @@ core::Result<void> write_colmap_text(const std::filesystem::path& folder, const 
 core::Result<ExportSummary> write_colmap(MapSource& source, const std::filesystem::path& output) {
   const auto store = source.store("the tracks of landmarks");
   if (!store) return tl::unexpected(store.error());
+
   ExportSummary summary;
   const std::unique_ptr<Pictures> recordings = open_pictures(source, summary);
   auto pictures = pictures_of(source, recordings.get());
   if (!pictures) return tl::unexpected(pictures.error());
+
   ColmapModel model;
   model.robots = source.robots();
   model.pictures = std::move(*pictures);
@@ -158,14 +175,17 @@ core::Result<ExportSummary> write_colmap(MapSource& source, const std::filesyste
 
   auto folder = prepare_export(output, source.request().replace);
   if (!folder) return tl::unexpected(folder.error());
+
   const std::filesystem::path sparse = folder->path() / "sparse" / "0";
   auto written = core::make_folder(sparse);
   if (written) {
     written = source.options().text ? write_colmap_text(sparse, model, source.frame_text())
                                     : write_colmap_binary(sparse, model);
   }
+
   if (written && recordings)
     written = write_pictures(source, *recordings, model.pictures, folder->path(), false, summary);
+
   if (written) {
     written = core::write_file(
         folder->path() / kExportNote,
@@ -173,6 +193,7 @@ core::Result<ExportSummary> write_colmap(MapSource& source, const std::filesyste
                     "the middle of the top left pixel is at (0.5, 0.5)\n",
                     source.frame_text()));
   }
+
   if (written) written = folder->commit();
   if (!written) return tl::unexpected(written.error());
   summary.written = {output};

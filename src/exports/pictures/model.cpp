@@ -115,11 +115,13 @@ core::Result<std::vector<ModelPoint>> landmark_points(MapSource& source,
                                                       const std::vector<Picture>& pictures) {
   const auto store = source.store("landmarks");
   if (!store) return tl::unexpected(store.error());
+
   const maps::Map& map = (*store)->stored().map;
   std::map<core::KeyframeId, std::size_t> picture_of;
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     if (pictures[i].pose.keyframe.valid()) picture_of[pictures[i].pose.keyframe] = i;
   }
+
   const auto cloud = source.cloud();
   const ColorCells colors(cloud ? **cloud : cloud::CloudFile{std::make_shared<cloud::Cloud>(), {}});
   std::vector<ModelPoint> points;
@@ -128,17 +130,21 @@ core::Result<std::vector<ModelPoint>> landmark_points(MapSource& source,
     ModelPoint point;
     point.position = source.world_from_map() * landmark.position;
     if (landmark.observations.size() < 2 || !source.selects(point.position)) continue;
+
     for (const maps::Observation& observation : landmark.observations) {
       const auto picture = picture_of.find(observation.keyframe);
       if (picture != picture_of.end()) point.track.push_back({picture->second, observation.feature});
     }
+
     const bool seen = point.track.size() >= 2;  // otherwise the model has too few of its keyframes
     keep_what_fits(source, map, pictures, point);
     if (seen && point.track.size() < 2) continue;
+
     if (!seen) point.track.clear();
     point.color = colors.at(point.position);
     points.push_back(std::move(point));
   }
+
   return points;
 }
 
@@ -170,6 +176,7 @@ core::Result<void> write_pictures(const MapSource& source, const Pictures& recor
   if (depth) {
     if (auto made = core::make_folder(folder / "depth"); !made) return made;
   }
+
   constexpr std::size_t kAtOnce = 16;  // for progress reports and bounded memory
   std::vector<core::Result<void>> written(pictures.size());
   std::vector<std::string> lost(pictures.size());
@@ -178,11 +185,13 @@ core::Result<void> write_pictures(const MapSource& source, const Pictures& recor
     source.executor().parallel_for(count, [&](std::size_t k) {
       const std::size_t i = first + k;
       if (!pictures[i].frame) return;
+
       const auto frame = recordings.read(pictures[i].pose.robot, *pictures[i].frame);
       if (!frame) {
         lost[i] = frame.error().message;
         return;
       }
+
       const std::string file = pictures[i].name + ".png";
       written[i] = dataset::write_png(folder / "images" / file, frame->color);
       if (written[i] && depth)
@@ -190,16 +199,19 @@ core::Result<void> write_pictures(const MapSource& source, const Pictures& recor
     });
     source.progress(first + count, pictures.size());
   }
+
   std::size_t missing = 0;
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     if (!written[i]) return written[i];
     if (!lost[i].empty()) pictures[i].frame.reset();
     if (!pictures[i].frame) ++missing;
   }
+
   if (missing > 0) {
     summary.notes.push_back(
         fmt::format("{} of {} poses have no picture in the recording", missing, pictures.size()));
   }
+
   return {};
 }
 

@@ -37,11 +37,13 @@ Json transforms_json(const MapSource& source, const std::vector<Picture>& pictur
   Json json;
   json["comment"] = source.frame_text() + "; cameras in OpenGL's axes: x right, y up, z backwards";
   json["camera_model"] = "PINHOLE";
+
   const bool one_camera = source.robots().size() == 1;
   if (one_camera) put_intrinsics(pinhole_of(source, source.robots().front().number), json);
   json["applied_transform"] = rows_of(Eigen::Matrix4d::Identity(), 3);
   json["ply_file_path"] = "points.ply";
   json["frames"] = Json::array();
+
   for (const Picture& picture : pictures) {
     Eigen::Matrix4d pose = picture.pose.world_from_camera.isometry().matrix();
     pose.col(1) *= -1.0;
@@ -53,6 +55,7 @@ Json transforms_json(const MapSource& source, const std::vector<Picture>& pictur
     frame["transform_matrix"] = rows_of(pose, 4);
     json["frames"].push_back(std::move(frame));
   }
+
   return json;
 }
 
@@ -82,20 +85,25 @@ core::Result<ExportSummary> write_nerfstudio(MapSource& source, const std::files
   const std::unique_ptr<Pictures> recordings = open_pictures(source, summary);
   auto pictures = pictures_of(source, recordings.get());
   if (!pictures) return tl::unexpected(pictures.error());
+
   auto folder = prepare_export(folder_name, source.request().replace);
   if (!folder) return tl::unexpected(folder.error());
+
   auto written = write_start_points(source, *pictures, folder->path() / "points.ply");
   if (written && recordings)
     written = write_pictures(source, *recordings, *pictures, folder->path(), source.options().depth, summary);
+
   if (written)
     written = core::write_file(folder->path() / "transforms.json",
                                transforms_json(source, *pictures).dump(2) + "\n");
+
   if (written)
     written =
         core::write_file(folder->path() / kExportNote,
                          "A nerfstudio data set that plumbline exported.\n" + source.frame_text() + "\n");
   if (written) written = folder->commit();
   if (!written) return tl::unexpected(written.error());
+
   summary.written = {folder_name};
   summary.notes.push_back(fmt::format("{} pictures", pictures->size()));
   return summary;

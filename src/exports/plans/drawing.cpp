@@ -83,6 +83,7 @@ core::Result<void> write_svg(const std::filesystem::path& file, const Drawing& d
       "<title>{2}</title>\n<desc>scale 1:{3}; {4:.6g} {5:.6g} (m) is at the lower left, {6:g} mm in",
       sheet.width_mm, sheet.height_mm, escaped(drawing.title), sheet.scale, sheet.low.x(), sheet.low.y(),
       sheet.margin_mm));
+
   for (const std::string& note : drawing.notes) out.write("; " + escaped(note));
   out.write("</desc>\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n");
   for (std::size_t layer = 0; layer < drawing.layers.size(); ++layer) {
@@ -91,11 +92,13 @@ core::Result<void> write_svg(const std::filesystem::path& file, const Drawing& d
         fmt::format("<g id=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{:g}\" stroke-linecap=\"round\" "
                     "stroke-linejoin=\"round\">\n",
                     l.name, l.color, l.width_mm));
+
     for (const DrawnLine& line : drawing.lines) {
       if (line.layer != layer) continue;
       out.write(fmt::format("<path d=\"{}\"{}/>\n", svg_path(line, sheet),
                             line.filled ? fmt::format(" fill=\"{}\" stroke=\"none\"", l.color) : ""));
     }
+
     for (const DrawnText& text : drawing.texts) {
       if (text.layer != layer) continue;
       const Eigen::Vector2d at = sheet.on_paper(text.at);
@@ -106,8 +109,10 @@ core::Result<void> write_svg(const std::filesystem::path& file, const Drawing& d
           at.x(), at.y(), -text.angle_rad * 180.0 / 3.14159265358979,
           1.4 * sheet.per_metre_mm * text.height_m, l.color, escaped(text.text)));
     }
+
     out.write("</g>\n");
   }
+
   out.write("</svg>\n");
   return out.commit();
 }

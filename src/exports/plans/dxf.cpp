@@ -73,12 +73,14 @@ void put_viewport(DxfText& dxf, const Eigen::Vector2d& middle, double height) {
     dxf.put(code, x);
     dxf.put(code + 10, y);
   };
+
   pair(10, 0.0, 0.0);
   pair(11, 1.0, 1.0);
   pair(12, middle.x(), middle.y());
   pair(13, 0.0, 0.0);
   pair(14, 0.1, 0.1);
   pair(15, 1.0, 1.0);
+
   dxf.put(16, 0.0);
   dxf.put(26, 0.0);
   dxf.put(36, 1.0);
@@ -123,6 +125,7 @@ void put_small_tables(DxfText& dxf) {
   dxf.put(70, 0);
   dxf.put(40, 0.0);
   dxf.put(41, 1.0);
+
   dxf.put(50, 0.0);
   dxf.put(71, 0);
   dxf.put(42, 0.2);
@@ -130,6 +133,7 @@ void put_small_tables(DxfText& dxf) {
   dxf.put(4, "");
   dxf.put(0, "ENDTAB");
   begin_table(dxf, "VIEW", "6", 0);
+
   dxf.put(0, "ENDTAB");
   begin_table(dxf, "UCS", "7", 0);
   dxf.put(0, "ENDTAB");
@@ -137,12 +141,14 @@ void put_small_tables(DxfText& dxf) {
   begin_entry(dxf, "APPID", "12", "9", "AcDbRegAppTableRecord", "ACAD");
   dxf.put(70, 0);
   dxf.put(0, "ENDTAB");
+
   begin_table(dxf, "DIMSTYLE", "A", 1);
   dxf.put(100, "AcDbDimStyleTable");
   begin_entry(dxf, "DIMSTYLE", "27", "A", "AcDbDimStyleTableRecord", "Standard");
   dxf.put(70, 0);
   dxf.put(340, "11");
   dxf.put(0, "ENDTAB");
+
   begin_table(dxf, "BLOCK_RECORD", kDxfBlocksTable, 2);
   begin_entry(dxf, "BLOCK_RECORD", kDxfModelBlock, kDxfBlocksTable, "AcDbBlockTableRecord", "*Model_Space");
   dxf.put(340, "22");
@@ -154,6 +160,7 @@ void put_small_tables(DxfText& dxf) {
 void put_blocks(DxfText& dxf) {
   dxf.put(0, "SECTION");
   dxf.put(2, "BLOCKS");
+
   for (const bool model : {true, false}) {
     const char* record = model ? kDxfModelBlock : kDxfPaperBlock;
     const char* name = model ? "*Model_Space" : "*Paper_Space";
@@ -165,6 +172,7 @@ void put_blocks(DxfText& dxf) {
       if (!model) dxf.put(67, 1);
       dxf.put(8, "0");
     };
+
     begin("BLOCK");
     dxf.put(100, "AcDbBlockBegin");
     dxf.put(2, name);
@@ -175,6 +183,7 @@ void put_blocks(DxfText& dxf) {
     begin("ENDBLK");
     dxf.put(100, "AcDbBlockEnd");
   }
+
   dxf.put(0, "ENDSEC");
 }
 
@@ -192,6 +201,7 @@ void put_entities(DxfText& dxf, const Drawing& drawing, const Eigen::Matrix2d& t
   dxf.put(2, "ENTITIES");
   const double turned = std::atan2(turn(1, 0), turn(0, 0)) * 180.0 / M_PI;
   const double scale = turn.col(0).norm();
+
   for (const DrawnLine& line : drawing.lines) {
     const DrawingLayer& layer = drawing.layers[line.layer];
     if (line.points.size() == 2 && !line.closed) {
@@ -201,22 +211,26 @@ void put_entities(DxfText& dxf, const Drawing& drawing, const Eigen::Matrix2d& t
       dxf.point(11, origin + turn * line.points[1]);
       continue;
     }
+
     begin_entity(dxf, "LWPOLYLINE", layer);
     dxf.put(100, "AcDbPolyline");
     dxf.put(90, static_cast<int>(line.points.size()));
     dxf.put(70, line.closed ? 1 : 0);
     dxf.put(43, 0.0);
+
     for (const Eigen::Vector2d& p : line.points) {
       const Eigen::Vector2d at = origin + turn * p;
       dxf.put(10, at.x());
       dxf.put(20, at.y());
     }
   }
+
   for (const DrawnText& text : drawing.texts) {
     const Eigen::Vector2d at = origin + turn * text.at;
     begin_entity(dxf, "TEXT", drawing.layers[text.layer]);
     dxf.put(100, "AcDbText");
     dxf.point(10, at);
+
     dxf.put(40, scale * text.height_m);
     dxf.put(1, text.text);
     dxf.put(50, text.angle_rad * 180.0 / M_PI + turned);
@@ -225,6 +239,7 @@ void put_entities(DxfText& dxf, const Drawing& drawing, const Eigen::Matrix2d& t
     dxf.put(100, "AcDbText");
     dxf.put(73, 2);
   }
+
   dxf.put(0, "ENDSEC");
 }
 
@@ -237,6 +252,7 @@ void put_layout(DxfText& dxf, const char* handle, const char* name, int order, c
   dxf.put(2, "none_device");
   dxf.put(4, "");
   dxf.put(6, "");
+
   for (int code = 40; code <= 49; ++code) dxf.put(code, 0.0);
   dxf.put(140, 0.0);
   dxf.put(141, 0.0);
@@ -244,6 +260,7 @@ void put_layout(DxfText& dxf, const char* handle, const char* name, int order, c
   dxf.put(143, 1.0);
   dxf.put(70, order == 0 ? 1712 : 688);
   dxf.put(72, 0);
+
   dxf.put(73, 0);
   dxf.put(74, 5);
   dxf.put(7, "");
@@ -251,6 +268,7 @@ void put_layout(DxfText& dxf, const char* handle, const char* name, int order, c
   dxf.put(147, 1.0);
   dxf.put(148, 0.0);
   dxf.put(149, 0.0);
+
   dxf.put(100, "AcDbLayout");
   dxf.put(1, name);
   dxf.put(70, 1);
@@ -258,6 +276,7 @@ void put_layout(DxfText& dxf, const char* handle, const char* name, int order, c
   dxf.put(10, 0.0);
   dxf.put(20, 0.0);
   dxf.put(11, 12.0);
+
   dxf.put(21, 9.0);
   dxf.point(12, Eigen::Vector2d::Zero());
   dxf.point(14, Eigen::Vector2d::Zero());
@@ -294,6 +313,7 @@ void put_objects(DxfText& dxf) {
                   {"ACAD_PLOTSTYLENAME", "E"}});
   put_dictionary(dxf, "D", kDxfRootDictionary, {});
   put_dictionary(dxf, "1A", kDxfRootDictionary, {{"Model", "22"}, {"Layout1", "1E"}});
+
   put_layout(dxf, "22", "Model", 0, kDxfModelBlock);
   put_layout(dxf, "1E", "Layout1", 1, kDxfPaperBlock);
   put_dictionary(dxf, "17", kDxfRootDictionary, {{"Standard", "18"}});
@@ -301,6 +321,7 @@ void put_objects(DxfText& dxf) {
   dxf.put(5, "18");
   dxf.put(330, "17");
   dxf.put(100, "AcDbMlineStyle");
+
   dxf.put(2, "Standard");
   dxf.put(70, 0);
   dxf.put(3, "");
@@ -308,11 +329,13 @@ void put_objects(DxfText& dxf) {
   dxf.put(51, 90.0);
   dxf.put(52, 90.0);
   dxf.put(71, 2);
+
   for (const double offset : {0.5, -0.5}) {
     dxf.put(49, offset);
     dxf.put(62, 256);
     dxf.put(6, "BYLAYER");
   }
+
   put_dictionary(dxf, "19", kDxfRootDictionary, {});
   dxf.put(0, "ACDBDICTIONARYWDFLT");
   dxf.put(5, "E");
@@ -320,6 +343,7 @@ void put_objects(DxfText& dxf) {
   dxf.put(100, "AcDbDictionary");
   dxf.put(281, 1);
   dxf.put(3, "Normal");
+
   dxf.put(350, "F");
   dxf.put(100, "AcDbDictionaryWithDefault");
   dxf.put(340, "F");
@@ -335,12 +359,14 @@ std::string dxf_header(const std::string& next_handle, const std::vector<std::st
   for (const std::string& note : notes) dxf.put(999, note);
   dxf.put(0, "SECTION");
   dxf.put(2, "HEADER");
+
   const auto variable = [&](const char* name) { dxf.put(9, name); };
   variable("$ACADVER");
   dxf.put(1, "AC1015");
   variable("$DWGCODEPAGE");
   dxf.put(3, "ANSI_1252");
   variable("$HANDSEED");
+
   dxf.put(5, next_handle);
   variable("$INSUNITS");
   dxf.put(70, 6);  // metres
@@ -348,6 +374,7 @@ std::string dxf_header(const std::string& next_handle, const std::vector<std::st
   dxf.put(70, 1);
   variable("$EXTMIN");
   dxf.point(10, low);
+
   variable("$EXTMAX");
   dxf.point(10, high);
   dxf.put(0, "ENDSEC");
@@ -369,11 +396,13 @@ core::Result<void> write_dxf(const std::filesystem::path& file, const Drawing& d
       high = high.cwiseMax(origin + turn * p);
     }
   }
+
   DxfText dxf;
   dxf.put(0, "SECTION");
   dxf.put(2, "TABLES");
   put_viewport(dxf, 0.5 * (low + high), 1.1 * std::max(1.0, (high - low).maxCoeff()));
   put_line_types(dxf);
+
   put_layers(dxf, drawing);
   put_small_tables(dxf);
   dxf.put(0, "ENDSEC");
@@ -381,6 +410,7 @@ core::Result<void> write_dxf(const std::filesystem::path& file, const Drawing& d
   put_entities(dxf, drawing, turn, origin);
   put_objects(dxf);
   dxf.put(0, "EOF");
+
   core::OutputFile out(file);
   out.write(dxf_header(dxf.next_handle(), drawing.notes, low, high));
   out.write(dxf.text());

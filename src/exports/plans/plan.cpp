@@ -156,12 +156,15 @@ core::Result<Drawing> section_drawing(MapSource& source, ExportSummary& summary)
   constexpr double kCell_m = 0.02;
   const std::vector<double>& line = source.options().section;
   if (line.size() != 4) return core::usage_error("--section: takes two places seen from above, x,y,x,y");
+
   const Eigen::Vector2d from(line[0], line[1]);
   const Eigen::Vector2d to(line[2], line[3]);
   const double length = (to - from).norm();
   if (length < kCell_m) return core::usage_error("--section: its two places are one");
+
   const auto cloud = source.cloud();
   if (!cloud) return tl::unexpected(cloud.error());
+
   const Eigen::Vector2d along = (to - from) / length;
   const Eigen::Vector2d across(-along.y(), along.x());
   std::set<std::pair<long, long>> cells;  // by row, then column
@@ -172,19 +175,23 @@ core::Result<Drawing> section_drawing(MapSource& source, ExportSummary& summary)
     if (s < 0.0 || s > length || std::abs(across.dot(way)) > kHalfThick_m) continue;
     cells.emplace(std::lround(std::floor(at.z() / kCell_m)), std::lround(std::floor(s / kCell_m)));
   }
+
   if (cells.empty()) {
     return core::input_error(
         fmt::format("{}: the section meets no point of the cloud", source.request().output.string()));
   }
+
   Drawing drawing;
   const std::size_t grid = drawing.add_layer({"grid", "#d0d0d0", 8, 0.1});
   const std::size_t section = drawing.add_layer({"section", "#000000", 7, 0.1});
   const std::size_t dimensions = drawing.add_layer({"dimensions", "#505050", 3, 0.13});
+
   for (auto cell = cells.begin(); cell != cells.end();) {  // neighbours in a row as one
     auto last = cell;
     auto next = std::next(cell);
     while (next != cells.end() && next->first == last->first && next->second == last->second + 1)
       last = next++;
+
     const double z0 = static_cast<double>(cell->first) * kCell_m;
     const double s0 = static_cast<double>(cell->second) * kCell_m;
     const double s1 = static_cast<double>(last->second + 1) * kCell_m;
@@ -192,6 +199,7 @@ core::Result<Drawing> section_drawing(MapSource& source, ExportSummary& summary)
         {section, {{s0, z0}, {s1, z0}, {s1, z0 + kCell_m}, {s0, z0 + kCell_m}}, true, true});
     cell = next;
   }
+
   draw_grid(grid, dimensions, drawing);
   drawing.title = fmt::format("{}: section from {:g},{:g} to {:g},{:g}", source.name(), line[0], line[1],
                               line[2], line[3]);
@@ -202,6 +210,7 @@ core::Result<Drawing> section_drawing(MapSource& source, ExportSummary& summary)
 core::Result<ExportSummary> write_plan(MapSource& source, const std::filesystem::path& output) {
   const auto reference = georeference_of(source.options());
   if (!reference) return tl::unexpected(reference.error());
+
   const bool section = !source.options().section.empty();
   const std::string ending = output.extension().string();
   if (*reference && (ending != ".dxf" || section)) {
@@ -210,9 +219,11 @@ core::Result<ExportSummary> write_plan(MapSource& source, const std::filesystem:
                     "--epsg out",
                     output.string()));
   }
+
   ExportSummary summary;
   auto drawing = section ? section_drawing(source, summary) : plan_drawing(source, summary);
   if (!drawing) return tl::unexpected(drawing.error());
+
   drawing->notes.push_back(section ? "x along the section, y up; metres" : source.frame_text());
   core::Result<void> written;
   if (ending == ".svg") {
@@ -223,10 +234,12 @@ core::Result<ExportSummary> write_plan(MapSource& source, const std::filesystem:
     const Georeference& world = **reference;
     drawing->notes = {fmt::format("frame: {} (EPSG:{}); x east, y north, metres", world.name, world.epsg)};
     written = write_dxf(output, *drawing, world.linear().topLeftCorner<2, 2>(), world.origin.head<2>());
+
     if (written) written = write_georeference(output, world);
   } else {
     written = write_dxf(output, *drawing);
   }
+
   if (!written) return tl::unexpected(written.error());
   summary.written = {output};
   return summary;

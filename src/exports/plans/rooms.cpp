@@ -44,11 +44,13 @@ std::vector<Eigen::Vector2d> chain_from(const std::vector<WallLine>& walls, std:
   std::size_t wall = first;
   int from = 0;
   facing = 0.0;
+
   do {
     if (!used.insert(wall).second) return {};
     const WallLine& w = walls[wall];
     const int to = 1 - from;
     outline.push_back(w.at(from == 0 ? w.s0 : w.s1));
+
     // Along its direction a wall has its normal on the right.
     facing += (from == 0 ? 1.0 : -1.0) * w.length();
     const int next = w.corner[static_cast<std::size_t>(to)];
@@ -67,8 +69,10 @@ Eigen::Vector2d label_place(const std::vector<Eigen::Vector2d>& outline, const s
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
   }
+
   Eigen::Vector2d best = 0.5 * (low + high);
   double widest = -1.0;
+
   for (int k = 1; k < 8; ++k) {
     const double y = low.y() + k * (high.y() - low.y()) / 8.0;
     std::vector<double> crossings;
@@ -80,10 +84,12 @@ Eigen::Vector2d label_place(const std::vector<Eigen::Vector2d>& outline, const s
           crossings.push_back(a.x() + (y - a.y()) / (b.y() - a.y()) * (b.x() - a.x()));
       }
     };
+
     add(outline);
     for (const Loop& loop : loops) {
       if (!loop.inwards && inside(outline, loop.outline.front())) add(loop.outline);
     }
+
     std::sort(crossings.begin(), crossings.end());
     for (std::size_t i = 0; i + 1 < crossings.size(); i += 2) {
       const double width = crossings[i + 1] - crossings[i] + (k == 4 ? 1e-6 : 0.0);
@@ -92,6 +98,7 @@ Eigen::Vector2d label_place(const std::vector<Eigen::Vector2d>& outline, const s
       best = {0.5 * (crossings[i] + crossings[i + 1]), y};
     }
   }
+
   return best;
 }
 
@@ -108,15 +115,19 @@ std::vector<WallRoom> rooms_of(const std::vector<WallLine>& walls) {
     Loop loop;
     loop.outline = chain_from(walls, i, used, facing);
     if (loop.outline.size() < 3) continue;
+
     done.insert(used.begin(), used.end());
     loop.area_m2 = area_of(loop.outline);
+
     // Walked counter-clockwise, a room lies on the left; normals on the left of the way look into it.
     loop.inwards = (loop.area_m2 > 0.0) == (facing < 0.0);
     if (loop.area_m2 < 0.0) std::reverse(loop.outline.begin(), loop.outline.end());
     loop.area_m2 = std::abs(loop.area_m2);
     loops.push_back(std::move(loop));
   }
+
   std::vector<WallRoom> rooms;
+
   for (const Loop& loop : loops) {
     if (!loop.inwards || loop.area_m2 < kSmallest_m2) continue;
     WallRoom room{loop.outline, loop.area_m2, {}};
@@ -127,6 +138,7 @@ std::vector<WallRoom> rooms_of(const std::vector<WallLine>& walls) {
     room.label = label_place(loop.outline, loops);
     rooms.push_back(std::move(room));
   }
+
   std::stable_sort(rooms.begin(), rooms.end(),
                    [](const WallRoom& a, const WallRoom& b) { return a.area_m2 > b.area_m2; });
   return rooms;

@@ -79,6 +79,7 @@ void fit_line(const std::vector<Eigen::Vector2d>& places, WallLine& line) {
     const auto bin = std::lround((line.normal.dot(p) - line.offset_m + kWallSlab_m) / kBin_m);
     if (bin >= 0 && bin < kBins) ++bins[static_cast<std::size_t>(bin)];
   }
+
   int best = 0;
   int most = -1;
   for (int b = 3; b + 3 < kBins; ++b) {
@@ -89,11 +90,13 @@ void fit_line(const std::vector<Eigen::Vector2d>& places, WallLine& line) {
       best = b;
     }
   }
+
   line.offset_m += best * kBin_m - kWallSlab_m;
 
   for (int pass = 0; pass < 3; ++pass) {
     const Eigen::Vector2d along = line.along();
     double n = 0.0, s_sum = 0.0, h_sum = 0.0, ss = 0.0, sh = 0.0;
+
     for (const Eigen::Vector2d& p : places) {
       const double h = line.normal.dot(p) - line.offset_m;
       if (std::abs(h) > kNear_m) continue;
@@ -104,12 +107,15 @@ void fit_line(const std::vector<Eigen::Vector2d>& places, WallLine& line) {
       ss += s * s;
       sh += s * h;
     }
+
     const double spread = ss - s_sum * s_sum / std::max(1.0, n);
     if (n < 20.0) return;
+
     // A short piece does not know its direction better than its plane does.
     const double slope = line.length() > 0.6 && spread > 0.0 ? (sh - s_sum * h_sum / n) / spread : 0.0;
     const double middle = s_sum / n;
     const double rest = h_sum / n - slope * middle;
+
     const Eigen::Vector2d first = line.at(line.s0);
     const Eigen::Vector2d last = line.at(line.s1);
     const Eigen::Vector2d normal = line.normal - slope * along;
@@ -168,6 +174,7 @@ std::vector<Side> sides_on(const evaluate::SurfaceSamples& samples, const evalua
   WallLine base;
   base.normal = plane.normal.head<2>().normalized();
   base.offset_m = plane.offset_m / plane.normal.head<2>().norm();
+
   const Eigen::Vector3f facing(static_cast<float>(base.normal.x()), static_cast<float>(base.normal.y()),
                                0.0F);
   std::vector<Eigen::Vector3d> own;
@@ -178,10 +185,12 @@ std::vector<Side> sides_on(const evaluate::SurfaceSamples& samples, const evalua
       own.push_back(p);
   }
   if (own.empty()) return {};
+
   const Eigen::Vector2d along = base.along();
   std::sort(own.begin(), own.end(), [&](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
     return along.dot(a.head<2>()) < along.dot(b.head<2>());
   });
+
   WallRaster raster(base.normal, base.offset_m, along.dot(own.front().head<2>()),
                     along.dot(own.back().head<2>()), floor_m);
   for (const Eigen::Vector3d& p : own) raster.add_surface(p);
@@ -191,12 +200,14 @@ std::vector<Side> sides_on(const evaluate::SurfaceSamples& samples, const evalua
     if (!is_wall(raster, run, need_m, cut_m)) continue;
     Side side;
     side.line = base;
+
     std::vector<Eigen::Vector2d> places;
     for (const Eigen::Vector3d& p : own) {
       const double s = along.dot(p.head<2>());
       if (s >= raster.start_of(run.first) && s < raster.start_of(run.second + 1))
         places.emplace_back(p.head<2>());
     }
+
     side.line.s0 = along.dot(places.front());
     side.line.s1 = along.dot(places.back());
     for (int c = run.first; c <= run.second; ++c) side.line.top_m = std::max(side.line.top_m, raster.top(c));
@@ -204,6 +215,7 @@ std::vector<Side> sides_on(const evaluate::SurfaceSamples& samples, const evalua
     fit_line(places, side.line);
     sides.push_back(side);
   }
+
   return sides;
 }
 
@@ -239,16 +251,19 @@ std::vector<WallLine> wall_sides(const cloud::CloudFile& file, double floor_m, d
     if (std::abs(planes[i].normal.z()) < kWallUpright)
       found[i] = sides_on(samples, planes[i], floor_m, need_m, cut_m);
   });
+
   std::vector<Side> sides;
   for (const auto& of_plane : found) sides.insert(sides.end(), of_plane.begin(), of_plane.end());
   std::stable_sort(sides.begin(), sides.end(),
                    [](const Side& a, const Side& b) { return a.points > b.points; });
+
   std::vector<WallLine> walls;
   for (const Side& side : sides) {
     const bool covered = std::any_of(walls.begin(), walls.end(),
                                      [&](const WallLine& wall) { return covers(wall, side.line); });
     if (!covered) walls.push_back(side.line);
   }
+
   return walls;
 }
 

@@ -77,6 +77,7 @@ std::vector<WallOpening> openings_between(const WallRaster& raster, double s0, d
       runs.emplace_back(c, c);
     }
   }
+
   std::vector<WallOpening> openings;
   for (const auto& [a, b] : runs) {
     const WallOpening opening{raster.start_of(a), raster.start_of(b + 1)};
@@ -84,6 +85,7 @@ std::vector<WallOpening> openings_between(const WallRaster& raster, double s0, d
     if (width >= kNarrowestDoor_m && width <= kWidestDoor_m && is_passage(raster, a, b, cut))
       openings.push_back(opening);
   }
+
   return openings;
 }
 
@@ -111,14 +113,17 @@ void bridge_gaps(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters,
       WallLine& a = walls[i];
       const WallLine& b = walls[j];
       if (i == j || a.corner[1] >= 0 || b.corner[0] >= 0 || a.normal.dot(b.normal) < 0.998) continue;
+
       const double from = a.along().dot(b.at(b.s0));
       const double gap = from - a.s1;
       if (gap <= 0.0 || gap > kLongest_m || std::abs(a.normal.dot(b.at(b.s0)) - a.offset_m) > kSameLine_m)
         continue;
+
       const int first = rasters[i].column_of(a.s1);
       const int last = rasters[i].column_of(from);
       const bool crossed = is_passage(rasters[i], first, last, {cut.low_m, cut.high_m, true});
       if (crossed && gap < kNarrowestDoor_m) continue;
+
       if (crossed || !cut.rays_known) a.openings.push_back(widened(rasters[i], {a.s1, from}, cut));
       const double to = a.along().dot(b.at(b.s1));
       for (const WallOpening& o : b.openings)
@@ -126,12 +131,14 @@ void bridge_gaps(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters,
       a.s1 = to;
       a.corner[1] = b.corner[1];
       a.top_m = std::max(a.top_m, b.top_m);
+
       walls.erase(walls.begin() + static_cast<std::ptrdiff_t>(j));
       rasters.erase(rasters.begin() + static_cast<std::ptrdiff_t>(j));
       join_corners(walls);
       i = static_cast<std::size_t>(-1);  // from the start: numbers have changed
       break;
     }
+
     if (i == static_cast<std::size_t>(-1)) continue;
   }
 }
@@ -150,6 +157,7 @@ void drop_loose_pieces(std::vector<WallLine>& walls) {
   constexpr double kSquare = 0.05;  // cosine: within 3 degrees
   std::vector<WallLine> joined = walls;
   join_corners(joined);
+
   std::vector<WallLine> kept;
   for (std::size_t i = 0; i < walls.size(); ++i) {
     const bool met = joined[i].corner[0] >= 0 && joined[i].corner[1] >= 0;
@@ -158,11 +166,13 @@ void drop_loose_pieces(std::vector<WallLine>& walls) {
              std::abs(joined[i].normal.dot(joined[static_cast<std::size_t>(other)].normal)) < kSquare &&
              joined[static_cast<std::size_t>(other)].length() >= kShort_m;
     });
+
     const bool goes_on = std::any_of(walls.begin(), walls.end(), [&](const WallLine& other) {
       return &other != &walls[i] && other.length() >= 0.5 * kShort_m && in_line(walls[i], other);
     });
     if (walls[i].length() >= kShort_m || met || square || goes_on) kept.push_back(walls[i]);
   }
+
   walls = std::move(kept);
 }
 
@@ -175,6 +185,7 @@ void join_corners(std::vector<WallLine>& walls) {
     wall.corner = {-1, -1};
     wall.corner_end = {0, 0};
   }
+
   struct Meeting {
     double distance;
     std::size_t wall;
@@ -184,6 +195,7 @@ void join_corners(std::vector<WallLine>& walls) {
     double s;
     double other_s;
   };
+
   std::vector<Meeting> meetings;
   for (std::size_t i = 0; i < walls.size(); ++i) {
     for (std::size_t j = 0; j < walls.size(); ++j) {
@@ -191,9 +203,11 @@ void join_corners(std::vector<WallLine>& walls) {
       normals.row(0) = walls[i].normal.transpose();
       normals.row(1) = walls[j].normal.transpose();
       if (i == j || std::abs(normals.determinant()) < kLeastTurn) continue;
+
       const Eigen::Vector2d at = normals.inverse() * Eigen::Vector2d(walls[i].offset_m, walls[j].offset_m);
       const double s = walls[i].along().dot(at);
       const double t = walls[j].along().dot(at);
+
       for (int end = 0; end < 2; ++end) {
         const double off = std::abs(s - (end == 0 ? walls[i].s0 : walls[i].s1));
         if (off > kReach_m) continue;
@@ -206,6 +220,7 @@ void join_corners(std::vector<WallLine>& walls) {
       }
     }
   }
+
   std::stable_sort(meetings.begin(), meetings.end(),
                    [](const Meeting& a, const Meeting& b) { return a.distance < b.distance; });
   for (const Meeting& m : meetings) {
@@ -213,10 +228,12 @@ void join_corners(std::vector<WallLine>& walls) {
     WallLine& other = walls[m.other];
     if (wall.corner[static_cast<std::size_t>(m.end)] >= 0) continue;
     if (m.other_end < 2 && other.corner[static_cast<std::size_t>(m.other_end)] >= 0) continue;
+
     wall.corner[static_cast<std::size_t>(m.end)] = static_cast<int>(m.other);
     wall.corner_end[static_cast<std::size_t>(m.end)] = m.other_end;
     (m.end == 0 ? wall.s0 : wall.s1) = m.s;
     if (m.other_end == 2) continue;
+
     other.corner[static_cast<std::size_t>(m.other_end)] = static_cast<int>(m.wall);
     other.corner_end[static_cast<std::size_t>(m.other_end)] = m.end;
     (m.other_end == 0 ? other.s0 : other.s1) = m.other_s;
@@ -228,6 +245,7 @@ std::vector<WallDoor> doors_of(const std::vector<WallLine>& walls) {
   std::vector<WallDoor> doors;
   std::vector<std::vector<bool>> used;
   for (const WallLine& wall : walls) used.emplace_back(wall.openings.size(), false);
+
   for (std::size_t i = 0; i < walls.size(); ++i) {
     for (std::size_t k = 0; k < walls[i].openings.size(); ++k) {
       if (used[i][k]) continue;
@@ -237,9 +255,11 @@ std::vector<WallDoor> doors_of(const std::vector<WallLine>& walls) {
       door.jambs = {wall.at(opening.s0), wall.at(opening.s1)};
       door.far_jambs = door.jambs;
       door.width_m = opening.s1 - opening.s0;
+
       // The other side of the same wall.
       for (std::size_t j = 0; j < walls.size(); ++j) {
         if (walls[j].normal.dot(wall.normal) > -0.98) continue;
+
         for (std::size_t m = 0; m < walls[j].openings.size(); ++m) {
           const std::array<Eigen::Vector2d, 2> far = {walls[j].at(walls[j].openings[m].s1),
                                                       walls[j].at(walls[j].openings[m].s0)};
@@ -252,9 +272,11 @@ std::vector<WallDoor> doors_of(const std::vector<WallLine>& walls) {
           door.width_m = std::min(door.width_m, walls[j].openings[m].s1 - walls[j].openings[m].s0);
         }
       }
+
       doors.push_back(door);
     }
   }
+
   return doors;
 }
 
@@ -262,20 +284,24 @@ core::Result<WallPlan> find_walls(MapSource& source) {
   if (auto up = source.need_upright("a plan"); !up) return tl::unexpected(up.error());
   const auto cloud = source.cloud();
   if (!cloud) return tl::unexpected(cloud.error());
+
   if (!(*cloud)->has_normals) {
     return core::input_error(fmt::format(
         "{}: a plan needs normals, which this cloud has not; run a filter chain with normals over it first",
         source.request().input.string()));
   }
+
   const double floor_m = source.floor_m();
   const double cut_m = source.options().cut_m;
   WallPlan plan;
   plan.walls = wall_sides(**cloud, floor_m, cut_m, source.executor());
   drop_loose_pieces(plan.walls);
+
   if (plan.walls.empty()) {
     return core::input_error(fmt::format("{}: no wall is seen at {:g} m over the floor; choose another --cut",
                                          source.request().input.string(), cut_m));
   }
+
   join_corners(plan.walls);
   std::vector<WallRaster> rasters = rasters_of(plan.walls, **cloud, floor_m);
   if (source.has_store()) {
@@ -286,14 +312,17 @@ core::Result<WallPlan> find_walls(MapSource& source) {
     if (!seen) return tl::unexpected(seen.error());
     plan.rays_known = true;
   }
+
   const Cut cut{std::max(0.25, cut_m - 0.3), cut_m + 0.3, plan.rays_known};
   for (std::size_t i = 0; i < plan.walls.size(); ++i)
     plan.walls[i].openings = openings_between(rasters[i], plan.walls[i].s0, plan.walls[i].s1, cut);
   bridge_gaps(plan.walls, rasters, cut);
+
   for (WallLine& wall : plan.walls) {
     std::sort(wall.openings.begin(), wall.openings.end(),
               [](const WallOpening& a, const WallOpening& b) { return a.s0 < b.s0; });
   }
+
   plan.doors = doors_of(plan.walls);
   plan.rooms = rooms_of(plan.walls);
   return plan;

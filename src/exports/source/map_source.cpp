@@ -81,8 +81,10 @@ std::vector<double> floor_heights(const cloud::Cloud& cloud) {
   for (const cloud::Point& p : cloud) {
     if (p.getVector3fMap().allFinite() && p.normal_z > kLevel) ++bins[std::lround(p.z / kBin_m)];
   }
+
   std::size_t widest = 0;
   for (const auto& [bin, count] : bins) widest = std::max(widest, count);
+
   std::vector<double> floors;
   for (auto bin = bins.begin(); bin != bins.end(); ++bin) {
     const auto next = std::next(bin);
@@ -91,6 +93,7 @@ std::vector<double> floor_heights(const cloud::Cloud& cloud) {
     const bool wide = static_cast<double>(bin->second) >= kLeastShare * static_cast<double>(widest);
     if (peak && wide && (floors.empty() || height > floors.back() + kStorey_m)) floors.push_back(height);
   }
+
   return floors;
 }
 
@@ -137,19 +140,23 @@ core::Result<void> MapSource::level_interrupted() {
     return core::input_error(
         fmt::format("{}: holds no frame yet; there is nothing to export", place_.store.string()));
   }
+
   auto fused = store_->fused(store_->fusion_options(), *executor_);
   if (!fused) return tl::unexpected(fused.error());
+
   cloud::CloudFile file;
   file.cloud = std::move(fused->cloud);
   file.columns = std::move(fused->columns);
   file.has_color = file.has_normals = true;
   Eigen::Vector3d up = Eigen::Vector3d::Zero();
   for (const auto& pose : frames) up -= pose.world_from_camera.rotation.col(1);
+
   if (const auto floor = cloud::find_floor(file.cloud, up.normalized())) {
     world_from_map_ = upright_from_map(*floor, frames.front().world_from_camera);
     upright_ = true;
     cloud::transform(*file.cloud, world_from_map_);
   }
+
   whole_ = std::move(file);
   log_->info(
       fmt::format("{}: the run was interrupted; {}", place_.store.string(),
@@ -161,12 +168,14 @@ core::Result<void> MapSource::select() {
   constexpr double kAll = std::numeric_limits<double>::infinity();
   const ExportOptions& o = options();
   selected_ = Eigen::AlignedBox3d(Eigen::Vector3d::Constant(-kAll), Eigen::Vector3d::Constant(kAll));
+
   if (!o.box.empty()) {
     if (o.box.size() != 6 || o.box[0] >= o.box[3] || o.box[1] >= o.box[4] || o.box[2] >= o.box[5])
       return core::usage_error("--box: takes x0,y0,z0,x1,y1,z1, each first one below its second");
     selected_ = Eigen::AlignedBox3d(Eigen::Vector3d(o.box[0], o.box[1], o.box[2]),
                                     Eigen::Vector3d(o.box[3], o.box[4], o.box[5]));
   }
+
   if (!o.z.empty()) {
     if (o.z.size() != 2 || o.z[0] >= o.z[1])
       return core::usage_error("--z: takes two heights, the lower first");
@@ -175,17 +184,21 @@ core::Result<void> MapSource::select() {
     selected_.max().z() = std::min(selected_.max().z(), o.z[1]);
     floor_m_ = 0.0;
   }
+
   if (o.storey < 0) return {};
   constexpr double kBelow_m = 0.2;  // points this far below belong to the storey's own floor
   if (auto up = need_upright("--storey"); !up) return up;
+
   const auto cloud = whole_cloud();
   if (!cloud) return tl::unexpected(cloud.error());
+
   const std::vector<double> floors = floor_heights(*(*cloud)->cloud);
   const auto wanted = static_cast<std::size_t>(o.storey);
   if (wanted >= floors.size()) {
     return core::usage_error(fmt::format("--storey {}: {} floor{} seen; 0 is the lowest", o.storey,
                                          floors.size(), floors.size() == 1 ? " is" : "s are"));
   }
+
   floor_m_ = floors[wanted];
   if (wanted > 0) selected_.min().z() = std::max(selected_.min().z(), floors[wanted] - kBelow_m);
   if (wanted + 1 < floors.size())
@@ -231,11 +244,13 @@ core::Result<cloud::CloudFile> MapSource::read_cloud() const {
     file->columns = std::move(coarse.columns);
     return file;
   }
+
   if (voxel_m == 0.0) return maps::read_map_cloud(place_, *executor_);
   cloud::DenseFusionOptions fusion = store_->fusion_options();
   fusion.voxels.voxel_m = voxel_m;
   auto fused = store_->fused(fusion, *executor_);
   if (!fused) return tl::unexpected(fused.error());
+
   cloud::CloudFile file;
   file.cloud = std::move(fused->cloud);
   file.columns = std::move(fused->columns);
@@ -280,6 +295,7 @@ core::Result<std::vector<ExportPose>> MapSource::stored_poses(bool keyframes_onl
     }
     return "";
   };
+
   std::map<std::pair<std::int32_t, double>, core::KeyframeId> keyframes;
   std::vector<ExportPose> all;
   for (const maps::KeyframePose& keyframe : poses.keyframes) {
@@ -289,6 +305,7 @@ core::Result<std::vector<ExportPose>> MapSource::stored_poses(bool keyframes_onl
                      world_from_map_ * keyframe.world_from_camera});
     }
   }
+
   for (std::size_t i = 0; !keyframes_only && i < poses.trajectory.size(); ++i) {
     const geometry::StampedPose& pose = poses.trajectory[i];
     const std::int32_t robot = poses.trajectory_ids[i].robot;
@@ -296,6 +313,7 @@ core::Result<std::vector<ExportPose>> MapSource::stored_poses(bool keyframes_onl
     all.push_back({robot, name_of(robot), keyframe == keyframes.end() ? core::KeyframeId{} : keyframe->second,
                    pose.stamp, world_from_map_ * pose.world_from_camera});
   }
+
   return all;
 }
 

@@ -35,22 +35,26 @@ core::Result<std::vector<RecordingName>> recordings_of(const MapSource& source,
   std::vector<RecordingName> names = recordings_of_run(header.configuration);
   const std::vector<std::string>& given = source.request().recordings;
   if (given.empty() && names.size() == robots) return names;
+
   if (given.empty()) {
     return core::input_error(fmt::format(
         "{}: does not say from which recordings it was made; name them with --recording, one for each robot",
         source.request().input.string()));
   }
+
   if (given.size() != robots) {
     return core::usage_error(
         fmt::format("--recording: {} given, the map is of {} robot{}; name one for each, in "
                     "the order of their names",
                     given.size(), robots, robots == 1 ? "" : "s"));
   }
+
   names.resize(robots);
   for (std::size_t i = 0; i < robots; ++i) {
     names[i].input = given[i];
     if (names[i].format.empty()) names[i].format = "auto";
   }
+
   return names;
 }
 
@@ -78,6 +82,7 @@ core::Result<std::vector<ExportPose>> sharpest_near(const MapSource& source,
   std::vector<ExportPose> chosen(keyframes.size());
   std::vector<double> best(keyframes.size(), -1.0);
   std::size_t at = 0;
+
   for (std::size_t f = 0; f < frames.size(); ++f) {
     const ExportPose& frame = frames[f];
     const auto before = [&](std::size_t k) {
@@ -88,22 +93,27 @@ core::Result<std::vector<ExportPose>> sharpest_near(const MapSource& source,
                             ? std::abs(keyframes[k + 1].stamp - frame.stamp)
                             : 1e300);
     };
+
     while (at + 1 < keyframes.size() && before(at)) ++at;
     source.progress(f, frames.size());
     const auto number = pictures.find(frame.robot, frame.stamp);
     if (!number || keyframes[at].robot != frame.robot ||
         std::abs(keyframes[at].stamp - frame.stamp) > kReach_s)
       continue;
+
     const auto picture = pictures.read(frame.robot, *number);
     if (!picture) continue;  // damaged: another one is chosen
+
     const double sharp = sharpness(picture->gray);
     if (sharp <= best[at]) continue;
     best[at] = sharp;
     chosen[at] = frame;
   }
+
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     if (best[k] < 0.0) chosen[k] = keyframes[k];
   }
+
   return chosen;
 }
 
@@ -112,25 +122,31 @@ core::Result<std::vector<ExportPose>> sharpest_near(const MapSource& source,
 core::Result<Pictures> Pictures::open(const MapSource& source) {
   const auto store = source.store("the cameras of pictures");
   if (!store) return tl::unexpected(store.error());
+
   const maps::StoreHeader& header = (*store)->stored().header;
   if (!source.request().open)
     return core::input_error("recordings cannot be opened here; pictures are left out");
+
   const auto names = recordings_of(source, header);
   if (!names) return tl::unexpected(names.error());
+
   Pictures pictures;
   for (std::size_t i = 0; i < header.robots.size(); ++i) {
     const maps::RobotInfo& robot = header.robots[i];
     Recording recording;
     auto opened = source.request().open((*names)[i]);
     if (!opened) return tl::unexpected(opened.error());
+
     recording.given = std::move(*opened);
     if (!robot.versions.empty())
       recording.corrected = recording.given->taken_by(robot.versions.back().camera);
+
     for (std::size_t f = 0; f < recording.given->size(); ++f)
       recording.stamps.emplace_back(recording.given->info(f).stamp, f);
     std::sort(recording.stamps.begin(), recording.stamps.end());
     pictures.by_robot_.emplace(robot.number, std::move(recording));
   }
+
   return pictures;
 }
 
@@ -161,29 +177,34 @@ core::Result<std::vector<Picture>> pictures_of(const MapSource& source, const Pi
   const ExportOptions& options = source.options();
   auto keyframes = source.poses(true);
   if (!keyframes) return tl::unexpected(keyframes.error());
+
   std::vector<ExportPose> poses = *keyframes;
   if (options.sharpest || options.every > 0) {
     const auto frames = source.poses(false);
     if (!frames) return tl::unexpected(frames.error());
     if (options.sharpest && pictures == nullptr)
       return core::input_error("--sharpest: takes the pictures of the recording; name it with --recording");
+
     if (options.sharpest) {
       auto chosen = sharpest_near(source, *keyframes, *frames, *pictures);
       if (!chosen) return tl::unexpected(chosen.error());
       poses = std::move(*chosen);
     }
+
     for (std::size_t i = 0; options.every > 0 && i < frames->size();
          i += static_cast<std::size_t>(options.every))
       poses.push_back((*frames)[i]);
     const auto earlier = [](const ExportPose& a, const ExportPose& b) {
       return a.robot != b.robot ? a.robot < b.robot : a.stamp < b.stamp;
     };
+
     std::stable_sort(poses.begin(), poses.end(), earlier);
     const auto same = [](const ExportPose& a, const ExportPose& b) {
       return a.robot == b.robot && a.stamp == b.stamp;
     };
     poses.erase(std::unique(poses.begin(), poses.end(), same), poses.end());
   }
+
   std::vector<Picture> all;
   std::map<std::int32_t, int> numbers;
   for (const ExportPose& pose : poses) {
@@ -194,6 +215,7 @@ core::Result<std::vector<Picture>> pictures_of(const MapSource& source, const Pi
     if (pictures != nullptr) picture.frame = pictures->find(pose.robot, pose.stamp);
     all.push_back(std::move(picture));
   }
+
   return all;
 }
 

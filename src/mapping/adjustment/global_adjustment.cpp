@@ -78,6 +78,7 @@ class GlobalBuilder {
     const auto tied_at = [&](const maps::Observation& o) -> int& {
       return tied[static_cast<std::size_t>(index_of(o.keyframe))];
     };
+
     for (const auto& [minus_seen, id] : order) {
       const std::vector<maps::Observation>& seen = map_.find(id)->observations;
       if (seen.size() < 2 || std::all_of(seen.begin(), seen.end(), [&](const maps::Observation& o) {
@@ -281,21 +282,25 @@ GlobalAdjustmentSummary adjust_map(maps::Map& map, const Cameras& cameras, const
   GlobalAdjustmentSummary summary;
   const std::vector<KeyframeId> ids = map.keyframe_ids();
   summary.keyframes = static_cast<int>(ids.size());
+
   if (ids.size() < 2) {
     summary.message = "fewer than two keyframes: nothing to adjust";
     return summary;
   }
+
   if (!anchor.valid()) anchor = ids.front();
   std::vector<Rigid3> before;
   for (const KeyframeId id : ids) before.push_back(map.camera_from_world(id));
   if (options.pose_graph && !extra.empty()) run_pose_graph(map, extra, options, anchor, summary);
   if (options.bundle) run_bundle(map, cameras, extra, options, anchor, summary);
+
   for (std::size_t i = 0; i < ids.size(); ++i) {
     const double shift =
         (before[i].inverse().translation - map.camera_from_world(ids[i]).inverse().translation).norm();
     summary.mean_shift_m += shift / static_cast<double>(ids.size());
     summary.max_shift_m = std::max(summary.max_shift_m, shift);
   }
+
   return summary;
 }
 
@@ -305,12 +310,14 @@ std::vector<KeyframeAccuracy> keyframe_accuracy(const maps::Map& map, const Came
   constexpr std::size_t kMost = 600;
   const std::vector<KeyframeId> ids = map.keyframe_ids();
   if (ids.empty() || ids.size() > kMost) return {};
+
   int unused = 0;
   MapBundle bundle = bundle_of(map, cameras, extra, options, anchor.valid() ? anchor : ids.front(), unused);
   widen(options.sigma_factors, bundle.problem);
   const std::vector<Matrix6d> covariances =
       optimize::pose_covariances(bundle.problem, options.bundle_options);
   if (covariances.empty()) return {};
+
   std::vector<KeyframeAccuracy> result(ids.size());
   for (std::size_t i = 0; i < ids.size(); ++i) {
     result[i].keyframe = ids[i];
@@ -320,6 +327,7 @@ std::vector<KeyframeAccuracy> keyframe_accuracy(const maps::Map& map, const Came
         static_cast<std::size_t>(std::count_if(
             extra.begin(), extra.end(), [&](const PoseEdge& e) { return e.a == ids[i] || e.b == ids[i]; })));
   }
+
   for (const auto& o : bundle.problem.point_observations) ++result[static_cast<std::size_t>(o.pose)].points;
   for (const auto& o : bundle.problem.line_observations) ++result[static_cast<std::size_t>(o.pose)].lines;
   return result;

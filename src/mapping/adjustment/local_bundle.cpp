@@ -140,6 +140,7 @@ class Builder {
       }
     };
     for (core::PointId id : points) vote(map_.point(id).observations);
+
     for (core::LineId id : lines) vote(map_.line(id).observations);
     for (KeyframeId id : std::vector<KeyframeId>(bundle_.keyframes)) {
       for (const maps::SurfaceEdge& edge : map_.edges_of(id)) {
@@ -147,6 +148,7 @@ class Builder {
         if (!has(other)) count[other] += 50;  // an edge counts like many landmarks
       }
     }
+
     std::vector<std::pair<KeyframeId, int>> others(count.begin(), count.end());
     std::stable_sort(others.begin(), others.end(),
                      [](const auto& a, const auto& b) { return a.second > b.second; });

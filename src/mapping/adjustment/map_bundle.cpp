@@ -24,6 +24,7 @@ void drop_outliers(const MapBundle& bundle, maps::Map& map) {
     map.unobserve(id, keyframe);
     if (map.find(id)->observations.empty()) map.remove(id);
   };
+
   for (std::size_t i = 0; i < bundle.point_seen.size(); ++i) {
     const maps::Observation& seen = bundle.point_seen[i];
     const optimize::BundlePointObservation& o = bundle.problem.point_observations[i];
@@ -31,6 +32,7 @@ void drop_outliers(const MapBundle& bundle, maps::Map& map) {
       drop(bundle.points[static_cast<std::size_t>(o.point)], map.point_of(seen.keyframe, seen.feature),
            seen.keyframe);
   }
+
   for (std::size_t i = 0; i < bundle.line_seen.size(); ++i) {
     const maps::Observation& seen = bundle.line_seen[i];
     const optimize::BundleLineObservation& o = bundle.problem.line_observations[i];

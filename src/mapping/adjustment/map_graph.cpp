@@ -203,16 +203,19 @@ std::vector<PoseEdge> map_edges(const maps::Map& map, int min_shared, int max_ne
     if (last.valid() && last.robot == id.robot && !begins_component) {
       edges.add(last, id, geometry::information_of(kNextSigma_m, kNextSigma_rad));
     }
+
     last = id;
     int neighbours = 0;
     for (const auto& [other, shared] : map.covisible(id, min_shared)) {
       if (shared < min_shared || ++neighbours > max_neighbours) break;
       edges.add(id, other, information_of_shared(shared));
     }
+
     for (const maps::SurfaceEdge& edge : map.edges_of(id)) {
       if (edge.b == id) edges.add(edge.a, id, geometry::information_of(kNextSigma_m, kNextSigma_rad));
     }
   }
+
   return edges.take();
 }
 
@@ -254,12 +257,14 @@ MapGraphResult solve_map_graph(const maps::Map& map, const std::vector<PoseEdge>
     result.summary.message = "the map is empty";
     return result;
   }
+
   if (!anchor.valid()) anchor = ids.front();
   GraphBuilder graph(map, anchor);
   const Gating gating = gate_edges(map, ids, extra, robust);
   for (std::size_t i = 0; i < extra.size(); ++i) {
     if (!gating.refused[i]) graph.add(extra[i], extra[i].information);
   }
+
   for (const PoseEdge& e : map_edges(map)) graph.add(e, e.information / gating.drift_factor);
   result.summary = optimize::solve_pose_graph(graph.graph(), robust);
   add_verdicts(gating, result.summary);

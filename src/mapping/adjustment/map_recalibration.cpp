@@ -61,6 +61,7 @@ Rigid3 aligned(const std::vector<SharedPlace>& places, const sensor::Pinhole& im
     for (const SharedPlace& place : places) {
       const Eigen::Vector3d y = b_from_a * place.in_a;
       if (y.z() < kNearest_m) continue;
+
       Eigen::Matrix<double, 3, 6> moves;
       moves << Eigen::Matrix3d::Identity(), -geometry::skew(y);
       Eigen::Matrix3d by_place;
@@ -68,6 +69,7 @@ Rigid3 aligned(const std::vector<SharedPlace>& places, const sensor::Pinhole& im
       by_place.row(1) << image.fx / y.z(), 0.0, -image.fx * y.x() / (y.z() * y.z());
       by_place.row(2) << 0.0, image.fy / y.z(), -image.fy * y.y() / (y.z() * y.z());
       by_place.bottomRows<2>() /= kSigma_px;
+
       Eigen::Vector3d residual;
       residual(0) = by_place.row(0) * (y - place.in_b);
       residual.tail<2>() = (image.project(y) - image.project(place.in_b)) / kSigma_px;
@@ -75,8 +77,10 @@ Rigid3 aligned(const std::vector<SharedPlace>& places, const sensor::Pinhole& im
       normal += jacobian.transpose() * jacobian;
       gradient += jacobian.transpose() * residual;
     }
+
     b_from_a = geometry::exp_se3(-normal.ldlt().solve(gradient)) * b_from_a;
   }
+
   return b_from_a;
 }
 
@@ -169,6 +173,7 @@ class MapRecalibration {
         previous = nullptr;
         continue;
       }
+
       const ImageChange image = image_of(frame);
       const Rigid3 before = frame.camera_from_reference;
       if (frame.camera_from_previous && previous != nullptr) {
@@ -176,10 +181,12 @@ class MapRecalibration {
             tracking::transformed(samples_.at(previous->reference), previous_before);
         frame.camera_from_previous = corrected(*frame.camera_from_previous, image_of(*previous), image, seen);
       }
+
       if (map_.keyframe(frame.reference).stamp != frame.stamp) {
         frame.camera_from_reference =
             corrected(before, images_.at(frame.reference), image, samples_.at(frame.reference));
       }
+
       previous = &frame;
       previous_before = before;
     }

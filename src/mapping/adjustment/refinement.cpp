@@ -18,6 +18,7 @@ std::vector<PoseEdge> align_local_maps(const maps::Map& map,
   counts.local_maps = local_maps.size();
   counts.tried = pairs.size();
   counts.accepted = edges.size();
+
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const SurfaceAlignment& a = alignments[i];
     if (a.refused.empty()) counts.mean_rms += a.rms / static_cast<double>(edges.size());
@@ -27,6 +28,7 @@ std::vector<PoseEdge> align_local_maps(const maps::Map& map,
                     pairs[i].a, pairs[i].b, a.overlap, a.inliers, a.rms, a.held, 1e3 * a.shift_m,
                     a.refused.empty() ? "" : "; not used: ", a.refused));
   }
+
   return edges;
 }
 

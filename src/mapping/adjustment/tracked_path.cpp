@@ -24,21 +24,25 @@ std::optional<Contradiction> contradiction(const maps::Map& map, const KeyframeP
     const auto found = moved.find(id);
     return found == moved.end() ? map.camera_from_world(id) : found->second;
   };
+
   std::optional<Contradiction> worst;
   for (const KeyframeId id : map.keyframe_ids()) {
     const maps::Keyframe& keyframe = map.keyframe(id);
     const KeyframeId reference = keyframe.reference;
     if (!reference.valid() || !map.has_keyframe(reference)) continue;
     if (moved.count(id) == 0 && moved.count(reference) == 0) continue;
+
     const Rigid3 expected = keyframe.camera_from_reference.inverse();
     const Rigid3 off = pose_of(id) * pose_of(reference).inverse() * expected;
     const Contradiction seen{reference, id, off.translation.norm(), geometry::rotation_angle(off.rotation)};
     if (!maps::beyond_noise(seen.off_m, seen.off_rad, keyframe.reference_sigma_m)) continue;
+
     const Rigid3 now = map.camera_from_world(id) * map.camera_from_world(reference).inverse() * expected;
     if (seen.off_m <= now.translation.norm() && seen.off_rad <= geometry::rotation_angle(now.rotation))
       continue;
     if (!worst || seen.off_m > worst->off_m) worst = seen;
   }
+
   return worst;
 }
 

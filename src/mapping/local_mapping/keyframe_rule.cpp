@@ -65,6 +65,7 @@ void KeyframeRuleOptions::declare(core::OptionTable& table) {
                 "Smallest number of frames between keyframes");
   table.integer("keyframe.max_frames", max_frames, {1, 10000}, "",
                 "Largest number of frames between keyframes while the camera moves");
+
   table.number("keyframe.min_shared", min_shared, {0.05, 1.0}, "",
                "Make a keyframe when the share of features still tracked falls below this");
   table.number("keyframe.min_overlap", min_surface_overlap, {0.05, 1.0}, "",
@@ -73,6 +74,7 @@ void KeyframeRuleOptions::declare(core::OptionTable& table) {
                "Make a keyframe when movement over depth exceeds this");
   table.number("keyframe.max_rotation", max_rotation_rad, {0.01, 3.0}, "rad",
                "Make a keyframe when rotation exceeds this");
+
   table.integer("keyframe.min_features", min_features, {0, 10000}, "",
                 "Number of tracked features below which a keyframe is urgent, if the image has more");
   table.boolean("keyframe.reuse", reuse,
@@ -83,6 +85,7 @@ void KeyframeRuleOptions::declare(core::OptionTable& table) {
                "Cone rule: largest share of the last keyframe's landmarks that are matched in a new one");
   table.integer("keyframe.cone_min_points", cone_min_points, {0, 10000}, "",
                 "Cone rule: smallest number of points that a keyframe matches, or half of the visible ones");
+
   table.integer("keyframe.cone_min_lines", cone_min_lines, {0, 10000}, "",
                 "Cone rule: smallest number of lines that a keyframe matches, or half of the visible ones");
   table.number(
@@ -91,6 +94,7 @@ void KeyframeRuleOptions::declare(core::OptionTable& table) {
   table.choice("keyframe.cone_balance", cone_balance,
                {{"above", Balance::kAbove}, {"below", Balance::kBelow}, {"off", Balance::kOff}},
                "Cone rule: required spread of these points (ECOG against its threshold)");
+
   table.boolean("keyframe.cone_scaled", cone_scaled,
                 "Cone rule: scale thresholds with the scene, and wait six frames for balance at most");
   table.choice(
@@ -141,6 +145,7 @@ ConeTerms KeyframeRule::cone_terms(const maps::Map& map, const tracking::TrackRe
   std::vector<double> changes;
   std::vector<Eigen::Vector2d> pixels;
   terms.now.all = static_cast<int>(track.features->points.size());
+
   for (const tracking::PointMatch& match : track.points) {
     const maps::MapPoint& point = map.point(match.point);
     if (point.normal.isZero()) continue;
@@ -151,17 +156,20 @@ ConeTerms KeyframeRule::cone_terms(const maps::Map& map, const tracking::TrackRe
     changes.push_back(std::abs(now - then));
     pixels.push_back(camera_.project(track.camera_from_world * point.position));
   }
+
   const int common = landmarks_in_common(map, track.reference, track);
   if (first_.keyframe != track.reference)
     first_ = {track.reference, common, track.points.size(), track.lines.size(), terms.now};
   terms.shared = first_.landmarks > 0 ? static_cast<double>(common) / first_.landmarks : 1.0;
   terms.threshold = cone_threshold(terms.now, first_.counts, options_.cone_epsilon, options_.cone_scaled);
+
   double least_change = options_.cone_min_change_rad;
   if (options_.cone_scaled && !changes.empty()) least_change = std::min(least_change, core::median(changes));
   GridCounts grid{};
   for (std::size_t i = 0; i < changes.size(); ++i) {
     if (changes[i] > least_change) count_in_grid(pixels[i], camera_.width, camera_.height, grid);
   }
+
   terms.balance = grid_balance(grid);
   terms.candidate = is_candidate(terms, track, mapper_idle);
   terms.fires = terms.now.changed > terms.threshold.adaptive && balance_will_do(terms);
@@ -182,6 +190,7 @@ KeyframeDecision KeyframeRule::decide(const maps::Map& map, const tracking::Trac
   d.frames_since = ++frames_since_;
   const int tracked = static_cast<int>(track.points.size() + track.lines.size());
   if (frames_since_ == 1) features_after_keyframe_ = tracked;
+
   const geometry::Rigid3 camera_from_keyframe =
       track.camera_from_world * map.camera_from_world(track.reference).inverse();
   const ViewOverlap view = overlap_of(reference, camera_from_keyframe, camera_);
@@ -190,9 +199,11 @@ KeyframeDecision KeyframeRule::decide(const maps::Map& map, const tracking::Trac
   d.parallax = camera_from_keyframe.inverse().translation.norm() / std::max(0.3, view.depth);
   d.rotation_rad = geometry::rotation_angle(camera_from_keyframe.rotation);
   d.urgent = is_urgent(d, tracked);
+
   if (reference.surface.empty() && points_with_depth(*track.features) >= kDepthIsBack) d.urgent = true;
   d.mapper_idle = mapper_idle;
   d.cone = cone_terms(map, track, mapper_idle);
+
   const bool by_cones = knows_cones();
   const bool wants = by_cones ? d.cone.candidate && d.cone.fires : plain_wants(d);
   d.wanted = d.frames_since >= options_.min_frames && (d.urgent || wants);
@@ -210,11 +221,13 @@ core::KeyframeId KeyframeRule::reusable_keyframe(const maps::Map& map,
   const auto count = [&](const std::vector<maps::Observation>& observations) {
     for (const maps::Observation& o : observations) ++common[o.keyframe];
   };
+
   for (const auto& m : track.points) count(map.point(m.point).observations);
   for (const auto& m : track.lines) count(map.line(m.line).observations);
   const auto tracked = static_cast<double>(track.points.size() + track.lines.size());
   core::KeyframeId best;
   int most = 0;
+
   for (const auto& [id, landmarks] : common) {
     if (id == track.reference || landmarks <= most || landmarks < options_.min_shared * tracked) continue;
     const geometry::Rigid3 camera_from_keyframe =
@@ -226,9 +239,11 @@ core::KeyframeId KeyframeRule::reusable_keyframe(const maps::Map& map,
         1.0 - view.overlap > kWellWithin * (1.0 - options_.min_surface_overlap)) {
       continue;
     }
+
     best = id;
     most = landmarks;
   }
+
   return best;
 }
 

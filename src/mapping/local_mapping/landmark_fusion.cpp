@@ -81,6 +81,7 @@ void fuse_into(maps::Map& map, const std::vector<PointId>& points, KeyframeId ke
   const features::FrameFeatures& features = *map.keyframe(keyframe).features;
   const auto matches = tracking::match_points(map, points, features, camera, pose, options.radius_px,
                                               options.association, nullptr);
+
   for (const tracking::PointMatch& m : matches) {
     const maps::MapPoint* point = map.find(m.point);  // an earlier match may have merged it away
     const features::PointFeature& f = features.points[static_cast<std::size_t>(m.feature)];
@@ -88,6 +89,7 @@ void fuse_into(maps::Map& map, const std::vector<PointId>& points, KeyframeId ke
         !fits(*point, f, pose, camera, options.association.scale_factor)) {
       continue;
     }
+
     const PointId other = map.point_of(keyframe, m.feature);
     if (!other.valid()) {
       map.observe(m.point, keyframe, m.feature);

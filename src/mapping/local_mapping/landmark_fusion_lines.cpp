@@ -112,12 +112,14 @@ void fuse_into(maps::Map& map, const std::vector<LineId>& lines, KeyframeId keyf
   const features::FrameFeatures& features = *map.keyframe(keyframe).features;
   const auto matches = tracking::match_lines(map, lines, features, camera, pose, options.radius_px,
                                              options.association, nullptr);
+
   for (const tracking::LineMatch& m : matches) {
     const maps::MapLine* line = map.find(m.line);  // an earlier match may have merged it away
     if (line == nullptr || maps::seen_by(line->observations, keyframe) ||
         !fits(*line, features.lines[static_cast<std::size_t>(m.feature)], pose, camera)) {
       continue;
     }
+
     const LineId other = map.line_of(keyframe, m.feature);
     if (!other.valid()) {
       map.observe(m.line, keyframe, m.feature);

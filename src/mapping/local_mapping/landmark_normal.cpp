@@ -17,6 +17,7 @@ Eigen::Vector3d depth_normal(const cv::Mat& depth, const Eigen::Vector2d& pixel,
   constexpr double kLeast_m = 0.004;  // of the gate at the end
   const int x = static_cast<int>(std::lround(pixel.x()));
   const int y = static_cast<int>(std::lround(pixel.y()));
+
   // On a plane inverse depth is affine in the pixels: q(du, dv) = q0 + q1 du + q2 dv.
   Eigen::Vector3d q(1.0 / z, 0.0, 0.0);
   int count = 0;
@@ -25,6 +26,7 @@ Eigen::Vector3d depth_normal(const cv::Mat& depth, const Eigen::Vector2d& pixel,
     Eigen::Matrix3d h = Eigen::Matrix3d::Zero();
     Eigen::Vector3d g = Eigen::Vector3d::Zero();
     count = fitting = 0;
+
     for (int v = std::max(0, y - kReach); v <= std::min(depth.rows - 1, y + kReach); v += kStep) {
       for (int u = std::max(0, x - kReach); u <= std::min(depth.cols - 1, x + kReach); u += kStep) {
         const auto there = static_cast<double>(depth.at<float>(v, u));
@@ -37,9 +39,11 @@ Eigen::Vector3d depth_normal(const cv::Mat& depth, const Eigen::Vector2d& pixel,
         g += basis / there;
       }
     }
+
     if (fitting < kLeast) return Eigen::Vector3d::Zero();
     q = h.ldlt().solve(g);
   }
+
   if (2 * fitting < count || !q.allFinite()) return Eigen::Vector3d::Zero();
   const double at_centre = q(0) + q(1) * (camera.cx - pixel.x()) + q(2) * (camera.cy - pixel.y());
   return -Eigen::Vector3d(q(1) * camera.fx, q(2) * camera.fy, at_centre).normalized();

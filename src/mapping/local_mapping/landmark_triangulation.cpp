@@ -59,16 +59,20 @@ class PairSearch {
     const Eigen::Vector3d line = fundamental_ * f.pixel.cast<double>().homogeneous();
     const double norm = line.head<2>().norm();
     if (!(norm > 1e-12)) return -1;
+
     int best = -1;
     int best_distance = 257;
     int second_distance = 257;
+
     for (int j : b_.free) {
       const features::PointFeature& g = b_.features.points[static_cast<std::size_t>(j)];
       const double off = std::abs(line.dot(g.pixel.cast<double>().homogeneous())) / norm;
       if (off > kEpipolarGate_px * sigma(g) || !alike(f, g)) continue;
+
       const int distance = features::hamming_distance(a_.features.descriptors[static_cast<std::size_t>(i)],
                                                       b_.features.descriptors[static_cast<std::size_t>(j)]);
       const bool alternative = best < 0 || (g.pixel - pixel_of(best)).norm() > kAlternative_px;
+
       if (distance < best_distance) {
         if (alternative) second_distance = best_distance;
         best_distance = distance;
@@ -77,6 +81,7 @@ class PairSearch {
         second_distance = distance;
       }
     }
+
     // Strictly less: two that both look exactly alike are no clear case.
     const bool clear =
         best_distance <= options_.max_hamming && best_distance < options_.ratio * second_distance;
@@ -94,6 +99,7 @@ class PairSearch {
     const double parallax = std::atan2(ray_a.cross(ray_b).norm(), ray_a.dot(ray_b));
     const double ray_sigma = noise * std::hypot(sigma(f), sigma(g)) / camera_.fx;
     if (!(ray_sigma < options_.max_relative_sigma * parallax)) return std::nullopt;
+
     // Nearest points of the two rays: s along a, t along b.
     const double c = ray_a.dot(ray_b);
     const double da = ray_a.dot(centre_b);
@@ -101,13 +107,16 @@ class PairSearch {
     const double s = (da - c * db) / (1.0 - c * c);
     const double t = (c * da - db) / (1.0 - c * c);
     if (!(s > 0.1) || !(t > 0.1)) return std::nullopt;
+
     const Eigen::Vector3d point = 0.5 * (s * ray_a + centre_b + t * ray_b);
     if (!(point.z() > 0.1) || point.z() > options_.max_depth_m) return std::nullopt;
     const Eigen::Vector3d in_b = b_from_a_ * point;
     if (!(in_b.z() > 0.1) || !fits(point, f) || !fits(in_b, g)) return std::nullopt;
+
     const double size_a = point.norm() * std::pow(options_.scale_factor, f.octave);
     const double size_b = in_b.norm() * std::pow(options_.scale_factor, g.octave);
     if (std::abs(std::log(size_a / size_b)) > std::log(kMaxScaleChange)) return std::nullopt;
+
     return point;
   }
 
@@ -155,25 +164,30 @@ std::optional<Meeting> meet(const maps::Map& map, const PairSearch& search, cons
   const auto point_of = [&](const maps::Observation& c) -> const features::PointFeature& {
     return map.keyframe(c.keyframe).features->points[static_cast<std::size_t>(c.feature)];
   };
+
   const auto alone = [&]() -> std::optional<Meeting> {
     const auto point = search.meet(point_of(newest), point_of(older), 1.0);
     if (!point) return std::nullopt;
     return Meeting{*point, std::nullopt};
   };
   if (image == nullptr) return alone();
+
   const features::CornerPatch& patch = image->newest.patches[static_cast<std::size_t>(newest.feature)];
   if (patch.empty()) return alone();
   const auto rough = search.meet(point_of(newest), point_of(older), options.aligned);
   if (!rough) return std::nullopt;
+
   const Rigid3& pose = map.camera_from_world(newest.keyframe);
   const auto at = tracking::align_observation(map, older, pose.inverse() * *rough, image->levels,
                                               patch.middle, camera, pose, options.scale_factor);
   if (!at) return alone();
+
   const Eigen::Vector2f shift = *at - patch.middle;
   features::PointFeature moved = point_of(newest);
   moved.pixel += shift;
   const auto point = search.meet(moved, point_of(older), options.aligned);
   if (!point) return std::nullopt;
+
   return Meeting{*point, shift};
 }
 
@@ -214,6 +228,7 @@ std::vector<core::PointId> triangulate_points(maps::Map& map, KeyframeId keyfram
   const bool aligns = image != nullptr && !image->levels.empty() &&
                       image->newest.patches.size() == image->newest.points.size();
   const NewestImage* const shown = aligns ? image : nullptr;
+
   bool moved = false;
   for (KeyframeId other : neighbours) {
     const FreeCorners a = free_corners_of(map, keyframe, max_measured_m);
@@ -224,16 +239,19 @@ std::vector<core::PointId> triangulate_points(maps::Map& map, KeyframeId keyfram
       if (j < 0 || map.point_of(other, j).valid()) continue;
       const auto found = meet(map, search, {keyframe, i}, {other, j}, camera, options, shown);
       if (!found) continue;
+
       if (found->shift) {
         shown->newest.move_point(static_cast<std::size_t>(i), *found->shift);
         moved = true;
       }
+
       const core::PointId id = add_landmark(map, keyframe, i, found->point);
       map.observe(id, other, j, found->shift.has_value());
       map.refresh_point(id);
       made.push_back(id);
     }
   }
+
   if (moved) shown->newest.grid = features::PointGrid(shown->newest.points, camera.width, camera.height);
   return made;
 }

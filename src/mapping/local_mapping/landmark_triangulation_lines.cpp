@@ -41,11 +41,13 @@ int partner(const maps::Map& map, const maps::Observation& line, KeyframeId othe
       map.camera_from_world(other).rotation * map.camera_from_world(line.keyframe).rotation.transpose();
   const Eigen::Rotation2Df roll(static_cast<float>(std::atan2(turn(1, 0), turn(0, 0))));
   const Eigen::Vector2f direction = roll * f.segment.direction();
+
   const auto min_cosine = static_cast<float>(std::cos(options.max_angle_rad));
   const auto& lines = map.keyframe(other).features->lines;
   int best = -1;
   int best_distance = 257;
   int second_distance = 257;
+
   for (std::size_t j = 0; j < lines.size(); ++j) {
     if (direction.dot(lines[j].segment.direction()) < min_cosine) continue;
     const int distance = features::hamming(f.descriptor, lines[j].descriptor);
@@ -57,8 +59,10 @@ int partner(const maps::Map& map, const maps::Observation& line, KeyframeId othe
     best_distance = distance;
     best = static_cast<int>(j);
   }
+
   if (best_distance > options.max_line_hamming || !(best_distance < options.ratio * second_distance))
     return -1;
+
   const bool taken =
       map.line_of(other, best).valid() || measured(lines[static_cast<std::size_t>(best)], max_measured_m);
   return taken ? -1 : best;
@@ -70,6 +74,7 @@ geometry::TriangulatedLine agree(std::vector<Candidate>& candidates, const Trian
   how.min_angle_rad = options.min_line_angle_rad;
   how.max_depth_m = options.max_depth_m;
   how.max_relative_sigma = options.max_relative_sigma;
+
   const auto attempt = [&](std::size_t without) {
     std::vector<LineView> views;
     for (std::size_t i = 0; i < candidates.size(); ++i) {
@@ -77,6 +82,7 @@ geometry::TriangulatedLine agree(std::vector<Candidate>& candidates, const Trian
     }
     return geometry::triangulate_line(views, how);
   };
+
   geometry::TriangulatedLine line = attempt(candidates.size());
   const auto enough = static_cast<std::size_t>(options.min_line_views);
   for (std::size_t i = 1; !line.ok() && i < candidates.size() && candidates.size() > enough; ++i) {
@@ -85,6 +91,7 @@ geometry::TriangulatedLine agree(std::vector<Candidate>& candidates, const Trian
     candidates.erase(candidates.begin() + static_cast<std::ptrdiff_t>(i));
     break;
   }
+
   return line;
 }
 
@@ -99,24 +106,29 @@ std::vector<core::LineId> triangulate_lines(maps::Map& map, KeyframeId keyframe,
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const maps::Observation own{keyframe, static_cast<int>(i)};
     if (map.line_of(keyframe, own.feature).valid() || measured(lines[i], max_measured_m)) continue;
+
     std::vector<Candidate> candidates{{own, view_of(map, own, camera)}};
     for (KeyframeId other : neighbours) {
       const int j = partner(map, own, other, max_measured_m, options);
       if (j >= 0) candidates.push_back({{other, j}, view_of(map, {other, j}, camera)});
     }
+
     if (static_cast<int>(candidates.size()) < options.min_line_views) continue;
     const geometry::TriangulatedLine line = agree(candidates, options);
     if (!line.ok()) continue;
+
     maps::MapLine landmark;
     landmark.start = line.start;
     landmark.end = line.end;
     landmark.descriptor = lines[i].descriptor;
     landmark.visible = 1;
     landmark.found = 1;
+
     const core::LineId id = map.add_line(keyframe.robot, landmark);
     for (const Candidate& c : candidates) map.observe(id, c.observation.keyframe, c.observation.feature);
     made.push_back(id);
   }
+
   return made;
 }
 

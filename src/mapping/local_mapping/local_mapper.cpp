@@ -23,6 +23,7 @@ void LocalMapperOptions::declare(core::OptionTable& table) {
                "Largest turn rate of images used to triangulate, find or merge landmarks: faster ones are "
                "distorted by the rolling shutter");
   culling.declare(table);
+
   table.boolean("triangulate", triangulate, "Triangulate landmarks without depth from several keyframes");
   triangulation.declare(table);
   table.boolean("fuse", fuse, "Find landmarks in neighbouring keyframes and merge duplicates");
@@ -30,6 +31,7 @@ void LocalMapperOptions::declare(core::OptionTable& table) {
   table.boolean("bundle", bundle, "Local bundle adjustment after each keyframe");
   table.integer("bundle.keyframes", bundle_keyframes, {2, 200}, "", "Keyframes that are adjusted together");
   bundle_noise.declare(table, "bundle.");
+
   table.boolean("edges", edges,
                 "Align the surfaces of neighbouring keyframes, as edges for bundle adjustment");
   table.integer("edges.keyframes", edge_keyframes, {1, 100}, "",
@@ -49,21 +51,25 @@ core::KeyframeId LocalMapper::insert(maps::Map& map, const sensor::RgbdFrame& fr
   keyframe->frame_index = frame.index;
   keyframe->stamp = frame.stamp;
   keyframe->turn_rate = track.turn_rate;
+
   if (track.reference.valid()) {
     keyframe->reference = track.reference;
     keyframe->camera_from_reference =
         track.camera_from_world * map.camera_from_world(track.reference).inverse();
     keyframe->reference_sigma_m = track.sigma_m();
   }
+
   if (options_.culling.by_keyframes) count(map, track);
   auto own = std::make_shared<features::FrameFeatures>(*track.features);
   if (!still(track.depth_from_camera))
     features::undo_line_depth_delay(*own, frame.depth, camera_, track.depth_from_camera);
   keyframe->features = own;
+
   // A keyframe's pose is that of its colour image, so the surface that the depth image measured a little
   // later or earlier is moved there. Otherwise every keyframe would be off by a few milliseconds of motion,
   // all in the direction of travel.
   keyframe->surface = tracking::sample_surface(frame.depth, camera_, options_.surface);
+
   if (!still(track.depth_from_camera))
     keyframe->surface =
         tracking::transformed(std::move(keyframe->surface), track.depth_from_camera.inverse());
@@ -71,6 +77,7 @@ core::KeyframeId LocalMapper::insert(maps::Map& map, const sensor::RgbdFrame& fr
   for (const tracking::PointMatch& m : track.points) {
     if (map.observe(m.point, id, m.feature, m.aligned)) map.refresh_point(m.point);
   }
+
   for (const tracking::LineMatch& m : track.lines) map.observe(m.line, id, m.feature);
   add_points(map, id, frame.depth);
   add_lines(map, id);
@@ -87,6 +94,7 @@ void LocalMapper::add_points(maps::Map& map, core::KeyframeId id, const cv::Mat&
     const features::PointFeature& f = features.points[i];
     if (!(f.depth > 0.0F) || static_cast<double>(f.depth) > options_.max_landmark_depth_m) continue;
     if (map.point_of(id, static_cast<int>(i)).valid()) continue;
+
     maps::MapPoint point;
     const Eigen::Vector3d in_camera = camera_.unproject(
         static_cast<double>(f.pixel.x()), static_cast<double>(f.pixel.y()), static_cast<double>(f.depth));
@@ -94,6 +102,7 @@ void LocalMapper::add_points(maps::Map& map, core::KeyframeId id, const cv::Mat&
     point.descriptor = features.descriptors[i];
     point.angle = f.angle;
     point.angle_keyframe = id;
+
     point.view_direction = (point.position - world_from_camera.translation).normalized();
     point.normal = world_from_camera.rotation *
                    depth_normal(depth, f.pixel.cast<double>(), static_cast<double>(f.depth), camera_);
@@ -101,6 +110,7 @@ void LocalMapper::add_points(maps::Map& map, core::KeyframeId id, const cv::Mat&
     point.reference_octave = f.octave;
     point.visible = 1;
     point.found = 1;
+
     const core::PointId point_id = map.add_point(id.robot, point);
     map.observe(point_id, id, static_cast<int>(i), true);
     culler_.watch(point_id, id);

@@ -59,11 +59,13 @@ GridBalance grid_balance(const GridCounts& grid) {
     const auto i = static_cast<int>(cell - grid.begin());
     return Eigen::Vector2d(i % 3 - 1, i / 3 - 1);
   };
+
   for (auto cell = grid.begin(); cell != grid.end(); ++cell) {
     if (cell != first && (second == grid.end() || *cell > *second)) second = cell;
     sum += *cell;
     centre += *cell * place(cell);
   }
+
   if (!(sum > 0.0)) return balance;
   balance.ecog = (place(first) - place(second)).norm() * *second / (2.0 * std::sqrt(2.0) * *first);
   balance.offset = (centre / sum).norm();

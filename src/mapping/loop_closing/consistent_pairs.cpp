@@ -62,6 +62,7 @@ class CliqueSearch {
   void paint(const std::vector<std::size_t>& rest, std::vector<std::size_t>& order,
              std::vector<std::size_t>& colours) const {
     std::vector<std::vector<std::size_t>> classes;
+
     for (const std::size_t v : rest) {
       const auto free = std::find_if(classes.begin(), classes.end(), [&](const auto& c) {
         return std::none_of(c.begin(), c.end(), [&](std::size_t w) { return joined_[v][w]; });
@@ -72,6 +73,7 @@ class CliqueSearch {
         free->push_back(v);
       }
     }
+
     for (std::size_t c = 0; c < classes.size(); ++c) {
       for (const std::size_t v : classes[c]) {
         order.push_back(v);
@@ -145,14 +147,17 @@ std::vector<ConsistentSet> consistent_sets(const maps::Map& map_a, const maps::M
       agreed[i][j] = agreed[j][i] = agree(map_a, map_b, pairs[i], pairs[j], options);
     }
   }
+
   std::vector<ConsistentSet> sets;
   std::vector<std::size_t> left(n);
   std::iota(left.begin(), left.end(), std::size_t{0});
+
   while (!left.empty() && sets.size() < options.max_sets) {
     std::vector<std::vector<bool>> joined(left.size(), std::vector<bool>(left.size()));
     for (std::size_t i = 0; i < left.size(); ++i) {
       for (std::size_t j = 0; j < left.size(); ++j) joined[i][j] = agreed[left[i]][left[j]];
     }
+
     std::vector<std::size_t> members;
     for (const std::size_t i : maximum_clique(joined, options.budget)) members.push_back(left[i]);
     const auto agrees = [&](std::size_t i) {
@@ -160,9 +165,11 @@ std::vector<ConsistentSet> consistent_sets(const maps::Map& map_a, const maps::M
       for (const std::size_t m : members) count += m == i || agreed[i][m] ? 1U : 0U;
       return std::find(members.begin(), members.end(), i) != members.end() || 2 * count >= members.size();
     };
+
     left.erase(std::remove_if(left.begin(), left.end(), agrees), left.end());
     sets.push_back(describe(map_a, map_b, pairs, std::move(members)));
   }
+
   return sets;
 }
 

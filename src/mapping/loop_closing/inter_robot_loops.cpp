@@ -72,16 +72,19 @@ std::optional<Loop> InterRobotLoops::by_way_of(const maps::Map& map, const Loop&
       map.shared(early.query, late.query) >= kSharedAtMost) {
     return std::nullopt;
   }
+
   const Rigid3& late_from_match = late.evidence.query_from_match;
   const Rigid3 late_from_their_early = late_from_match * theirs.camera_from_world(late.match) *
                                        theirs.camera_from_world(early.match).inverse();
   Loop loop{late.query, early.query, late.evidence};
   Rigid3& late_from_early = loop.evidence.query_from_match;
   late_from_early = late_from_their_early * early.evidence.query_from_match.inverse();
+
   const Matrix6d covariance = late.evidence.information.inverse() +
                               seen_from(path_covariance(theirs, early.match, late.match), late_from_match) +
                               seen_from(early.evidence.information.inverse(), late_from_early);
   loop.evidence.information = covariance.inverse();
+
   const Rigid3 now = map.camera_from_world(late.query) * map.camera_from_world(early.query).inverse();
   const geometry::Vector6d error = geometry::log_se3(now * late_from_early.inverse());
   chi2 = error.dot(loop.evidence.information * error);
@@ -92,10 +95,12 @@ std::vector<Loop> InterRobotLoops::detect(places::Database& database, const maps
                                           KeyframeId keyframe) {
   update(database);
   if (others_ == nullptr) return {};
+
   std::vector<Loop> verified;
   if (auto seen = recognise(database, map, keyframe)) verified.push_back(std::move(*seen));
   const std::vector<Loop> sure = pending_.confirm(others_->map, map, keyframe, verified, options_);
   std::vector<Loop> loops;
+
   for (const Loop& late : sure) {
     std::optional<Loop> worst;
     double most = optimize::chi_square_gate(6);
@@ -106,8 +111,10 @@ std::vector<Loop> InterRobotLoops::detect(places::Database& database, const maps
       most = chi2;
       worst = std::move(loop);
     }
+
     if (worst) loops.push_back(std::move(*worst));
   }
+
   sightings_.insert(sightings_.end(), sure.begin(), sure.end());
   return loops;
 }

@@ -58,18 +58,22 @@ std::vector<Loop> LoopCloser::verify(const maps::Map& map, KeyframeId keyframe,
     LoopTrial trial;
     trial.loop = {keyframe, candidate.keyframe, {}};
     trial.score = candidate.score;
+
     const std::uint64_t seed = options_.seed + static_cast<std::uint64_t>(keyframe.index);
     trial.loop.evidence =
         verify_place({&map, keyframe, camera_}, {&map, candidate.keyframe, camera_}, options_.verify, seed);
     trial.refused = judge(map, trial);
     trials_.push_back(trial);
+
     if (!trial.refused.empty()) {
       if (trial.loop.evidence.accepted) far.push_back(std::move(trial.loop));
       continue;
     }
+
     ++counts_.verified;
     verified.push_back(std::move(trial.loop));
   }
+
   note_dispute(map, keyframe, far);
   return verified;
 }
@@ -142,15 +146,18 @@ std::vector<Loop> PendingLoops::confirm(const maps::Map& matches, const maps::Ma
   };
   waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(), gone), waiting_.end());
   if (verified.empty()) return {};
+
   waiting_.insert(waiting_.end(), verified.begin(), verified.end());
   std::vector<PlacePair> pairs;
   for (const Loop& loop : waiting_) pairs.push_back({loop.match, loop.query, loop.evidence.query_from_match});
+
   const std::vector<ConsistentSet> sets = consistent_sets(matches, queries, pairs, options.consistency);
   if (sets.empty() || static_cast<int>(sets[0].keyframes_b) < options.agreeing) return {};
   if (sets.size() > 1 && static_cast<double>(sets[1].keyframes_b) >
                              options.max_alternative * static_cast<double>(sets[0].keyframes_b)) {
     return {};
   }
+
   std::vector<Loop> result;
   for (const std::size_t i : sets[0].members) result.push_back(waiting_[i]);
   const bool fresh =
@@ -163,6 +170,7 @@ std::vector<Loop> PendingLoops::confirm(const maps::Map& matches, const maps::Ma
 std::vector<Loop> LoopCloser::detect(const maps::Map& map, KeyframeId keyframe) {
   const auto& features = map.keyframe(keyframe).features;
   if (features == nullptr) return {};
+
   const auto related = map.covisible(keyframe, kRelated);
   const double now = map.keyframe(keyframe).stamp;
   const KeyframeId root = maps::root_of(map, keyframe);
@@ -171,6 +179,7 @@ std::vector<Loop> LoopCloser::detect(const maps::Map& map, KeyframeId keyframe) 
     if (maps::root_of(map, id) != root) return false;  // another component: not a loop
     return std::none_of(related.begin(), related.end(), [&](const auto& r) { return r.first == id; });
   };
+
   const auto neighbours = [&](KeyframeId id) { return map.neighbours(id, kAroundLoop); };
   const auto candidates =
       recogniser_.recognise(database_.query(*features), keyframe, last_, allowed, neighbours);
@@ -179,6 +188,7 @@ std::vector<Loop> LoopCloser::detect(const maps::Map& map, KeyframeId keyframe) 
   last_ = keyframe;
   std::vector<Loop> sure = pending_.confirm(map, map, keyframe, verified, options_);
   if (others_ == nullptr) return sure;
+
   for (const Loop& loop : others_->detect(database_, map, keyframe)) {
     LoopTrial trial;
     trial.loop = loop;
@@ -187,6 +197,7 @@ std::vector<Loop> LoopCloser::detect(const maps::Map& map, KeyframeId keyframe) 
     trials_.push_back(trial);
     if (trial.refused.empty()) sure.push_back(loop);
   }
+
   return sure;
 }
 
@@ -251,8 +262,10 @@ bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
     for (const PoseEdge& edge : edges) note_verdict(edge, wrong->text());
     return false;
   }
+
   std::vector<PoseEdge> believed;
   std::vector<PoseEdge> fresh;
+
   for (std::size_t i = 0; i < all.size(); ++i) {
     const bool wrong = i < solved.summary.edges.size() && solved.summary.edges[i].rejected;
     if (i >= known) note_verdict(all[i], wrong ? "the pose graph rejected it" : "");
@@ -263,12 +276,14 @@ bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
     believed.push_back(all[i]);
     if (i >= known) fresh.push_back(all[i]);
   }
+
   set_loops(map, believed);
   if (fresh.empty()) return false;
 
   move_keyframes(map, solved.poses);
   for (const PoseEdge& edge : fresh) merge_duplicates(map, edge);
   ++counts_.accepted;
+
   if (options_.bundle) {
     GlobalAdjustmentOptions adjustment;
     adjustment.pose_graph = false;               // it is solved
@@ -276,6 +291,7 @@ bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
     adjustment.noise.orb_scale_factor = options_.verify.orb_scale_factor;
     counts_.refused += adjust_map(map, {{edges.front().b.robot, camera_}}, believed, adjustment).refused;
   }
+
   return true;
 }
 

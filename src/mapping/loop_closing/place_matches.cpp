@@ -79,6 +79,7 @@ std::vector<std::pair<std::size_t, std::size_t>> alike_both_ways(const FrameFeat
   std::vector<std::pair<std::size_t, std::size_t>> pairs;
   if (rows == 0 || columns == 0) return pairs;
   if (std::max(rows, columns) >> kIndexBits != 0) throw std::length_error("alike_both_ways: too many points");
+
   std::vector<int> table(rows * columns);
   std::vector<std::uint32_t> nearest_in_b(rows);
   std::vector<std::uint32_t> nearest_in_a(columns, std::numeric_limits<std::uint32_t>::max());
@@ -89,6 +90,7 @@ std::vector<std::pair<std::size_t, std::size_t>> alike_both_ways(const FrameFeat
     nearest_in_b[i] = take_nearest(row, static_cast<std::uint32_t>(columns), static_cast<std::uint32_t>(i),
                                    nearest_in_a.data());
   }
+
   for (std::size_t i = 0; i < rows; ++i) {
     const std::size_t j = index_of(nearest_in_b[i]);
     if (index_of(nearest_in_a[j]) != i || nearest_in_b[i] >> kIndexBits > kMaxHamming) continue;
@@ -97,6 +99,7 @@ std::vector<std::pair<std::size_t, std::size_t>> alike_both_ways(const FrameFeat
       pairs.emplace_back(i, j);
     }
   }
+
   return pairs;
 }
 

@@ -92,10 +92,12 @@ std::vector<Rigid3> from_points(const Sample& sample, const sensor::Pinhole& cam
     space.emplace_back(pair->match.x(), pair->match.y(), pair->match.z());
     image.emplace_back(pair->query.x(), pair->query.y());
   }
+
   const cv::Matx33d k(camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0);
   std::vector<cv::Mat> rotations;
   std::vector<cv::Mat> translations;
   cv::solveP3P(space, image, k, cv::noArray(), rotations, translations, cv::SOLVEPNP_AP3P);
+
   std::vector<Rigid3> poses;
   for (std::size_t i = 0; i < rotations.size(); ++i) {
     const auto r = [&](int row) { return rotations[i].at<double>(row); };
@@ -103,6 +105,7 @@ std::vector<Rigid3> from_points(const Sample& sample, const sensor::Pinhole& cam
     const Rigid3 pose(geometry::exp_so3({r(0), r(1), r(2)}), {t(0), t(1), t(2)});
     if (pose.rotation.allFinite() && pose.translation.allFinite()) poses.push_back(pose);
   }
+
   return poses;
 }
 
@@ -116,6 +119,7 @@ std::optional<Rigid3> from_lines(const LinePair& one, const LinePair& two) {
   constexpr double kMinSine = 0.3;
   if (a1.cross(a2).norm() < kMinSine || b1.cross(b2).norm() < kMinSine) return std::nullopt;
   if (std::abs(a1.dot(a2) - b1.dot(b2)) > 0.1) return std::nullopt;
+
   const auto frame = [](const Eigen::Vector3d& u, const Eigen::Vector3d& v) {
     Eigen::Matrix3d m;
     m.col(0) = (u + v).normalized();
@@ -124,8 +128,10 @@ std::optional<Rigid3> from_lines(const LinePair& one, const LinePair& two) {
     return m;
   };
   const Eigen::Matrix3d rotation = frame(b1, b2) * frame(a1, a2).transpose();
+
   // Across each line, the moved line must meet the measured one: (I - d d^T)(R m + t - q) = 0.
   Eigen::Matrix3d h = Eigen::Matrix3d::Zero();
+
   Eigen::Vector3d g = Eigen::Vector3d::Zero();
   for (const auto& [pair, d] : {std::pair{&one, b1}, std::pair{&two, b2}}) {
     const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - d * d.transpose();
@@ -134,6 +140,7 @@ std::optional<Rigid3> from_lines(const LinePair& one, const LinePair& two) {
     h += across;
     g += across * (q - rotation * m);
   }
+
   const Rigid3 pose(Eigen::Quaterniond(rotation), h.ldlt().solve(g));
   if (!pose.translation.allFinite()) return std::nullopt;
   return pose;
@@ -155,9 +162,11 @@ std::optional<RansacPose> ransac_pose(const PosePairs& pairs, const sensor::Pinh
   for (const LinePair& pair : pairs.lines) {
     if (pair.in_space) in_space.push_back(&pair);
   }
+
   const bool by_points = pairs.points.size() >= 4;
   const bool by_lines = in_space.size() >= 3 && pairs.points.size() < kFewPoints;
   if (!by_points && !by_lines) return std::nullopt;
+
   const Inliers inliers(pairs, camera);
   core::SplitMix draw(seed);
   std::optional<RansacPose> best;
@@ -167,26 +176,31 @@ std::optional<RansacPose> ransac_pose(const PosePairs& pairs, const sensor::Pinh
     best = inliers.of(pose);
     best_count = best->points.size() + best->lines.size();
   };
+
   int needed = max_rounds;
   for (int round = 0; round < needed; ++round) {
     if (by_points && (!by_lines || round % 2 == 0)) {
       const std::size_t n = pairs.points.size();
       const std::array<std::size_t, 3> i{draw.below(n), draw.below(n), draw.below(n)};
       if (i[0] == i[1] || i[1] == i[2] || i[0] == i[2]) continue;
+
       const Sample sample{&pairs.points[i[0]], &pairs.points[i[1]], &pairs.points[i[2]]};
       for (const Rigid3& pose : from_points(sample, camera)) try_pose(pose);
     } else {
       const std::size_t i = draw.below(in_space.size());
       const std::size_t j = draw.below(in_space.size());
       if (i == j) continue;
+
       const auto pose = from_lines(*in_space[i], *in_space[j]);
       if (pose) try_pose(*pose);
     }
+
     const double share =
         static_cast<double>(best_count) / static_cast<double>(pairs.points.size() + pairs.lines.size());
     needed = std::min(max_rounds, std::max(20, (by_lines ? 2 : 1) * rounds_needed(share, 3, max_rounds)));
   }
   if (!best || static_cast<int>(best_count) < min_inliers) return std::nullopt;
+
   return best;
 }
 

@@ -33,20 +33,25 @@ SurfaceVotes vote_surface(const std::vector<maps::SurfaceSample>& samples,
   constexpr double kMaxDepth = 5.0;  // m; noise is too large beyond
   SurfaceVotes votes;
   if (other_depth.empty()) return votes;
+
   const double scale_x = static_cast<double>(other_depth.cols) / other_camera.width;
   const double scale_y = static_cast<double>(other_depth.rows) / other_camera.height;
+
   for (const maps::SurfaceSample& s : samples) {
     const Eigen::Vector3d p = other_from_own * s.point.cast<double>();
     if (p.z() < 0.4 || p.z() > kMaxDepth) continue;
     const Eigen::Vector3d normal = other_from_own.rotation * s.normal.cast<double>();
     if (-normal.dot(p) < 0.25 * p.norm()) continue;  // turned away: could not have been seen
+
     const Eigen::Vector2d pixel = other_camera.project(p);
     const int x = static_cast<int>(std::floor(pixel.x() * scale_x));
     const int y = static_cast<int>(std::floor(pixel.y() * scale_y));
     if (x < 1 || y < 1 || x + 1 >= other_depth.cols || y + 1 >= other_depth.rows) continue;
+
     float low = 1e9F;
     float high = 0.0F;
     int measured = 0;
+
     for (int v = y - 1; v <= y + 1; ++v) {
       const float* row = other_depth.ptr<float>(v);
       for (int u = x - 1; u <= x + 1; ++u) {
@@ -57,6 +62,7 @@ SurfaceVotes vote_surface(const std::vector<maps::SurfaceSample>& samples,
       }
     }
     if (measured < kMinNeighbours) continue;
+
     const double tolerance = 0.04 + 3.0 * sensor::depth_sigma(p.z());
     if (p.z() < static_cast<double>(low) - tolerance) {
       ++votes.contradicted;
@@ -66,6 +72,7 @@ SurfaceVotes vote_surface(const std::vector<maps::SurfaceSample>& samples,
       ++votes.confirmed;
     }
   }
+
   return votes;
 }
 

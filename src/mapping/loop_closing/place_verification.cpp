@@ -64,6 +64,7 @@ PosePairs pairs_by_descriptor(const PlaceView& query, const PlaceView& match,
   const bool differ = std::abs(std::log(query.camera.fx / match.camera.fx)) > kSimilarFocals;
   std::optional<SizeGate> gate;
   if (differ) gate = size_gate(m, match.camera.fx, q, query.camera.fx, how.orb_scale_factor);
+
   for (const auto& [i, best] : alike_both_ways(m, q, gate ? &*gate : nullptr)) {
     PointPair pair;
     if (!point_in_space(match, i, pair.match)) continue;
@@ -73,24 +74,30 @@ PosePairs pairs_by_descriptor(const PlaceView& query, const PlaceView& match,
     if (how.depth_rows) pair.depth = static_cast<double>(f.depth);
     pairs.points.push_back(pair);
   }
+
   features::LineMatchOptions options;
   options.max_angle_rad = 1.0;
   options.min_length_ratio = 0.3;
+
   for (const features::LineMatch& l : features::match_lines(m.lines, q.lines, options)) {
     const features::LineFeature& from = m.lines[static_cast<std::size_t>(l.a)];
     const features::LineFeature& to = q.lines[static_cast<std::size_t>(l.b)];
     if (!from.line3) continue;
+
     LinePair pair;
     pair.match_start = from.line3->start;
     pair.match_end = from.line3->end;
     pair.query = to.segment;
+
     if (to.line3) {
       pair.in_space = true;
       pair.query_start = to.line3->start;
       pair.query_end = to.line3->end;
     }
+
     pairs.lines.push_back(pair);
   }
+
   return pairs;
 }
 
@@ -138,6 +145,7 @@ class Growth {
                                   association_, &visible_lines);
     problem.points = tracking::point_terms(*match_.map, points, features, association_);
     problem.lines = tracking::line_terms(*match_.map, lines, features, kLineSigma_px);
+
     for (int round = 0; round < 2; ++round) {
       summary = optimize::solve_pose(problem, camera_from_world, solver_);
       camera_from_world = summary.camera_from_world;
@@ -146,6 +154,7 @@ class Growth {
       tracking::keep_inliers(optimize::line_errors(problem, camera_from_world), kLineGate, lines,
                              problem.lines);
     }
+
     summary = optimize::solve_pose(problem, camera_from_world, solver_);
     camera_from_world = summary.camera_from_world;
   }
@@ -219,6 +228,7 @@ void align(const PlaceView& query, const PlaceView& match, const std::vector<Key
            PlaceVerification& result) {
   const maps::Keyframe& q = query.map->keyframe(query.keyframe);
   if (q.surface.empty()) return;
+
   const AlignmentOptions options;
   const cloud::SurfaceSearch theirs = search_of(gather_surface(*match.map, near, match.keyframe));
   const cloud::SurfaceSearch ours = search_of(q.surface);
@@ -227,6 +237,7 @@ void align(const PlaceView& query, const PlaceView& match, const std::vector<Key
   result.surface_rms = aligned.rms;
   result.surface_aligned = aligned.refused.empty();
   if (!result.surface_aligned) return;
+
   // Both estimates together: first order about the features' one.
   const geometry::Vector6d xi = geometry::log_se3(aligned.b_from_a * result.query_from_match.inverse());
   const Matrix6d sum = result.information + aligned.information;
@@ -279,6 +290,7 @@ PlaceVerification verify_place(const PlaceView& query, const PlaceView& match,
   const PosePairs pairs = pairs_by_descriptor(query, match, options);
   result.matched_points = static_cast<int>(pairs.points.size());
   result.matched_lines = static_cast<int>(pairs.lines.size());
+
   constexpr int kMinRansac = 10;
   const auto start = ransac_pose(pairs, query.camera, options.rounds, kMinRansac, seed);
   if (!start) {
@@ -286,12 +298,14 @@ PlaceVerification verify_place(const PlaceView& query, const PlaceView& match,
         fmt::format("no pose from {} points and {} lines", pairs.points.size(), pairs.lines.size());
     return result;
   }
+
   result.ransac_inliers = static_cast<int>(start->points.size() + start->lines.size());
   const std::vector<KeyframeId> around = surroundings(match, options.neighbours);
   Growth growth(query, match, options, around);
   const Rigid3& match_from_world = match.map->camera_from_world(match.keyframe);
   Rigid3 camera_from_world = start->query_from_match * match_from_world;
   for (const double radius : {15.0, 8.0, 5.0}) growth.grow(camera_from_world, radius);
+
   if (options.joint) {
     ObservationNoise noise;
     noise.orb_scale_factor = options.orb_scale_factor;
@@ -299,20 +313,24 @@ PlaceVerification verify_place(const PlaceView& query, const PlaceView& match,
     camera_from_world =
         adjust_pair(query, match, around, growth.points, growth.lines, noise, camera_from_world);
   }
+
   result.query_from_match = camera_from_world * match_from_world.inverse();
   result.points = static_cast<int>(growth.problem.points.size());
   result.lines = static_cast<int>(growth.problem.lines.size());
   result.visible_points = static_cast<int>(growth.visible_points.size());
   result.visible_lines = static_cast<int>(growth.visible_lines.size());
+
   const int visible = result.visible_points + 2 * result.visible_lines;
   result.found = visible > 0 ? static_cast<double>(result.points + 2 * result.lines) / visible : 0.0;
   result.cells = growth.cells();
   result.rms_px = growth.summary.points.rms;
+
   // The information of xi at the left of camera_from_world is that of query_from_match.
   result.information = growth.summary.information;
   const std::vector<KeyframeId> near(around.begin(), around.begin() + static_cast<std::ptrdiff_t>(std::min(
                                                                           around.size(), kSurfaceKeyframes)));
   compare_surfaces(query, match, near, result);
+
   result.refused = judge(result, options);
   result.accepted = result.refused.empty();
   if (result.accepted && options.align) align(query, match, near, result);

@@ -61,6 +61,7 @@ std::vector<VerifiedPair> verify_neighbours(const PartPair& maps, const PairSets
   std::set<std::pair<KeyframeId, KeyframeId>> seen;
   for (const VerifiedPair& pair : known)
     seen.emplace(std::min(pair.query, pair.match), std::max(pair.query, pair.match));
+
   std::vector<OverlapFinder::Candidate> candidates;
   for (std::size_t i = 0; i < std::min(kSets, sets.sets.size()); ++i) {
     const Rigid3 a_from_b = mean_alignment(maps, sets.places_of(i)).a_from_b;
@@ -71,13 +72,16 @@ std::vector<VerifiedPair> verify_neighbours(const PartPair& maps, const PairSets
       candidates.push_back({query, match, query_part, match_part, 0.0});
       ++added;
     };
+
     for (const KeyframeId id : b.keyframe_ids()) {
       add(maps.b, id, maps.a, nearest_view(a, a_from_b, b.camera_from_world(id).inverse(), kMay));
     }
+
     for (const KeyframeId id : a.keyframe_ids()) {
       add(maps.a, id, maps.b, nearest_view(b, a_from_b.inverse(), a.camera_from_world(id).inverse(), kMay));
     }
   }
+
   return verify_all(maps, candidates);
 }
 
@@ -90,6 +94,7 @@ CrossValidation cross_validate(const PartPair& maps, const std::vector<VerifiedP
   std::set<KeyframeId> agreed;
   for (const VerifiedPair& pair : agreeing)
     agreed.insert(b.has_keyframe(pair.query) ? pair.query : pair.match);
+
   std::vector<OverlapFinder::Candidate> open;
   for (const KeyframeId id : b.keyframe_ids()) {
     const KeyframeId near = nearest_view(a, a_from_b, b.camera_from_world(id).inverse(), kMust);
@@ -100,10 +105,12 @@ CrossValidation cross_validate(const PartPair& maps, const std::vector<VerifiedP
       open.push_back({id, near, maps.b, maps.a, 0.0});
     }
   }
+
   std::vector<OverlapFinder::Candidate> tried;
   const std::size_t step = std::max<std::size_t>((open.size() + kMost - 1) / kMost, 1);
   for (std::size_t i = 0; i < open.size(); i += step) tried.push_back(open[i]);
   result.expected = result.confirmed + static_cast<int>(tried.size());
+
   const PairSets known = accepted_pairs(maps, agreeing);
   const PairSets fresh = accepted_pairs(maps, verify_all(maps, tried));
   for (std::size_t i = 0; i < fresh.places.size(); ++i) {
@@ -114,6 +121,7 @@ CrossValidation cross_validate(const PartPair& maps, const std::vector<VerifiedP
     ++result.confirmed;
     result.pairs.push_back(fresh.pairs[i]);
   }
+
   return result;
 }
 

@@ -30,6 +30,7 @@ FreeDirection free_direction(const maps::Map& a, const maps::Map& b, const geome
   for (const VerifiedPair& pair : agreeing) keyframes.insert({pair.query, pair.match});
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   double count = 0.0;
+
   for (const core::KeyframeId id : keyframes) {
     const Eigen::Matrix3d a_from_camera = a.has_keyframe(id)
                                               ? a.camera_from_world(id).inverse().rotation
@@ -40,6 +41,7 @@ FreeDirection free_direction(const maps::Map& a, const maps::Map& b, const geome
       count += 1.0;
     }
   }
+
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(scatter / std::max(1.0, count));
   FreeDirection free{axes.eigenvalues()[0], axes.eigenvalues()[1], 0.0};
   const auto way = [&](int axis) {

@@ -48,23 +48,27 @@ Layout lay_out(const std::vector<MapPart>& parts, const std::vector<MergeEvidenc
   Layout layout;
   auto& anchor_from_part = layout.anchor_from_part;
   anchor_from_part[anchor] = {};
+
   for (bool grown = true; grown;) {
     grown = false;
     for (const MergeEvidence* merge : order) {
       const bool has_a = anchor_from_part.count(merge->a) != 0;
       const bool has_b = anchor_from_part.count(merge->b) != 0;
       if (has_a == has_b) continue;
+
       if (has_a) {
         anchor_from_part[merge->b] = anchor_from_part[merge->a] * merge->alignment.a_from_b;
       } else {
         anchor_from_part[merge->a] = anchor_from_part[merge->b] * merge->alignment.a_from_b.inverse();
       }
+
       if (!merge->pairs.empty())
         layout.ties.push_back(tie_of(*merge, *parts[has_a ? merge->b : merge->a].map));
       grown = true;
       break;  // start again with the best remaining merge
     }
   }
+
   return layout;
 }
 
@@ -139,6 +143,7 @@ void MapFusionOptions::declare_decision(core::OptionTable& table, const std::str
   table.number(prefix + "few_extent", few_extent_m, {0.0, 1000.0}, "m",
                "Smallest extent of both maps along a direction that no surface constrains, to detect "
                "repeated structure");
+
   table.number(prefix + "min_span", min_span_m, {0.0, 100.0}, "m",
                "Smallest distance between the keyframes that agree");
   table.number(prefix + "min_turn", min_span_rad, {0.0, 3.2}, "rad", "Or smallest rotation between them");
@@ -148,6 +153,7 @@ void MapFusionOptions::declare_decision(core::OptionTable& table, const std::str
                "Largest rotation between them");
   table.number(prefix + "drift", consistency.apart_per_metre, {0.0, 1.0}, "",
                "Additional distance per metre between the pairs, for drift");
+
   table.number(prefix + "max_alternative", alternative, {0.0, 1.0}, "",
                "Share of the best answer's keyframes from which a second answer makes both doubtful");
   table.number(prefix + "max_seen_through", max_seen_through, {0.0, 1.0}, "",
@@ -189,6 +195,7 @@ FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>
     maps.push_back(parts[part].map);
     fused.cameras.insert(parts[part].cameras.begin(), parts[part].cameras.end());
   }
+
   fused.map = joined(maps, fused.anchor_from_part);
   for (const auto& [root, parent] : layout.ties) fused.map.set_parent(root, parent);
 
@@ -200,8 +207,10 @@ FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>
     edges.insert(edges.end(), more.begin(), more.end());
     used.push_back(&merge);
   }
+
   fused.edges = static_cast<int>(edges.size());
   if (edges.empty()) return fused;
+
   const std::vector<PoseEdge> loops = loop_edges(fused.map);  // closed by each robot
   edges.insert(edges.end(), loops.begin(), loops.end());
   const std::vector<KeyframeId> ids = parts[anchor].map->keyframe_ids();
@@ -209,11 +218,13 @@ FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>
   adjustment.robust = options.robust;
   adjustment.noise.orb_scale_factor = options.verify.orb_scale_factor;
   adjustment.bundle = false;  // before surfaces are aligned it would bend a map with a narrow overlap
+
   const GlobalAdjustmentSummary graph = adjust_map(fused.map, fused.cameras, edges, adjustment, ids.front());
   fused.refused = graph.refused;
   fused.refusal = graph.refusal;
   if (take_back(graph.extra, used, fused)) return fuse_maps(parts, merges, anchor, options);
   if (!options.merge_duplicates) return fused;
+
   const std::vector<PoseEdge> believed = believed_edges(edges, graph.extra);
   std::set<std::pair<KeyframeId, KeyframeId>> done;
   for (const PoseEdge& edge : believed) merge_duplicates(edge, options, done, fused);

@@ -104,15 +104,18 @@ Ambiguity ambiguity_of(const PartPair& maps, const PairSets& sets, const Rigid3&
   const MapOverlay laid(maps.parts[maps.a], maps.parts[maps.b]);
   Ambiguity result;
   result.overlap = laid.fit(a_from_b);
+
   if (support(sets.sets.front()) < maps.options.min_pairs) {
     const MapOverlay::Surfaces surfaces = laid.surfaces(a_from_b);
     result.surfaces_there = surfaces.there;
     result.surfaces_through = surfaces.through;
   }
+
   std::vector<Alternative> others = alternatives(maps, sets, a_from_b, laid);
   maps.executor.parallel_for(others.size(), [&](std::size_t i) {
     check_against_maps(laid, a_from_b, result.overlap, maps.options, others[i]);
   });
+
   for (const Alternative& other : others) {
     if (other.refuted) continue;
     result.alternative = std::max(result.alternative, other.support);
@@ -123,6 +126,7 @@ Ambiguity ambiguity_of(const PartPair& maps, const PairSets& sets, const Rigid3&
     result.alternative_overlap = other.fit;
     result.alternative_m = other.apart.metres;
   }
+
   return result;
 }
 
@@ -132,6 +136,7 @@ std::string objection(const Ambiguity& ambiguity, int agreeing, const MapFusionO
     return fmt::format("the aligned maps contradict each other: {} of the landmarks were seen through",
                        percent(overlap.seen_through()));
   }
+
   const bool few = agreeing < options.min_pairs;
   const MapOverlay::Surfaces surfaces{ambiguity.surfaces_there, ambiguity.surfaces_through};
   if (few && (surfaces.there < kSurfaces || surfaces.contradict(kNoAlternativeOfFewSpots, kSurfaces))) {
@@ -140,6 +145,7 @@ std::string objection(const Ambiguity& ambiguity, int agreeing, const MapFusionO
         "seen through",
         agreeing, surfaces.there, surfaces.through);
   }
+
   // One keyframe may be mistaken; two that agree are an alternative. For few keyframes no alternative is
   // allowed.
   if (ambiguity.alternative >= (few ? 1 : 2) && ambiguity.alternative >= options.alternative * agreeing) {
@@ -147,6 +153,7 @@ std::string objection(const Ambiguity& ambiguity, int agreeing, const MapFusionO
         "two answers exclude each other: {} keyframes say one thing, {} another; places look alike here",
         agreeing, ambiguity.alternative);
   }
+
   if (ambiguity.alternative_m > 0.0) {
     return fmt::format(
         "places look alike here: {:.1f} m away the maps fit too ({} of the landmarks are found instead of "
@@ -155,6 +162,7 @@ std::string objection(const Ambiguity& ambiguity, int agreeing, const MapFusionO
         ambiguity.alternative_m, percent(ambiguity.alternative_overlap.share()), percent(overlap.share()),
         percent(ambiguity.alternative_overlap.seen_through()));
   }
+
   return {};
 }
 

@@ -61,6 +61,7 @@ int in_common(const maps::Map& a, const Consistency& consistency) {
 std::string objection(const PartPair& maps, const Consistency& consistency, const Rigid3& a_from_b) {
   const MapFusionOptions& options = maps.options;
   if (consistency.verified == 0) return "no two keyframes were verified to show the same place";
+
   const bool few = consistency.agreeing < options.min_pairs;
   if (const int common = in_common(maps.map_a(), consistency);
       few && (consistency.agreeing < options.few_pairs || common < options.few_inliers)) {
@@ -69,6 +70,7 @@ std::string objection(const PartPair& maps, const Consistency& consistency, cons
         "needed, or {} with {} in common)",
         consistency.agreeing, common, options.min_pairs, options.few_pairs, options.few_inliers);
   }
+
   const FreeDirection free = free_direction(maps.map_a(), maps.map_b(), a_from_b, consistency.pairs);
   if ((few ? free.slides() : free.corridor()) && free.reach_m < options.few_extent_m) {
     return fmt::format(
@@ -76,12 +78,14 @@ std::string objection(const PartPair& maps, const Consistency& consistency, cons
         "({} m are needed to see whether things repeat)",
         free.corridor() ? "corridor" : "wall", free.reach_m, options.few_extent_m);
   }
+
   if (!few && consistency.span_m < options.min_span_m && consistency.span_rad < options.min_span_rad) {
     return fmt::format(
         "the keyframes that agree lie within {:.2f} m and {:.2f} rad: one place that looks alike is not "
         "enough",
         consistency.span_m, consistency.span_rad);
   }
+
   return {};
 }
 
@@ -127,14 +131,17 @@ std::vector<OverlapFinder::Candidate> OverlapFinder::recognise(const places::Dat
     return where == parts.size() ? std::vector<KeyframeId>{}
                                  : parts[where].map->neighbours(id, kSurroundings);
   };
+
   const auto allowed = [&](KeyframeId id) {
     const std::size_t where = part_of(parts, id);
     return where != part && where != parts.size();
   };
+
   const KeyframeId usual = before.valid() && database_.contains(before) ? before : KeyframeId{};
   for (const places::Candidate& c : recogniser_.recognise(scores, keyframe, usual, allowed, neighbours)) {
     result.push_back({keyframe, c.keyframe, part, part_of(parts, c.keyframe), c.score});
   }
+
   return result;
 }
 
@@ -145,6 +152,7 @@ std::vector<OverlapFinder::Candidate> OverlapFinder::look_at_all(const std::vect
     KeyframeId keyframe;
     KeyframeId before;
   };
+
   std::vector<Query> queries;
   for (std::size_t p = 0; p < parts.size(); ++p) {
     KeyframeId before;
@@ -155,6 +163,7 @@ std::vector<OverlapFinder::Candidate> OverlapFinder::look_at_all(const std::vect
       before = id;
     }
   }
+
   constexpr std::size_t kAtATime = 256;  // keyframes scored at a time, to bound memory
   std::vector<Candidate> candidates;
   for (std::size_t first = 0; first < queries.size(); first += kAtATime) {
@@ -163,6 +172,7 @@ std::vector<OverlapFinder::Candidate> OverlapFinder::look_at_all(const std::vect
       const Query& q = queries[first + i];
       scores[i] = database_.query(*parts[q.part].map->keyframe(q.keyframe).features);
     });
+
     for (std::size_t i = 0; i < scores.size();
          ++i) {  // in order, because recognition depends on earlier queries
       const Query& q = queries[first + i];
@@ -170,6 +180,7 @@ std::vector<OverlapFinder::Candidate> OverlapFinder::look_at_all(const std::vect
       candidates.insert(candidates.end(), found.begin(), found.end());
     }
   }
+
   return candidates;
 }
 
@@ -192,25 +203,30 @@ MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, s
   MergeEvidence merge;
   merge.a = a;
   merge.b = b;
+
   PairSets sets = pair_sets(maps, found);
   if (!sets.sets.empty() && support(sets.sets.front()) < options.min_pairs) {
     std::vector<VerifiedPair> more = verify_neighbours(maps, sets, found);
     more.insert(more.begin(), found.begin(), found.end());
     sets = pair_sets(maps, more);
   }
+
   merge.consistency = consistency_of(maps, sets);
   if (!sets.sets.empty()) merge.alignment = mean_alignment(maps, sets.places_of(0));
   merge.pairs = merge.consistency.pairs;
   merge.refused = objection(maps, merge.consistency, merge.alignment.a_from_b);
+
   if (merge.refused.empty()) {
     merge.ambiguity = ambiguity_of(maps, sets, merge.alignment.a_from_b);
     merge.refused = objection(merge.ambiguity, merge.consistency.agreeing, options);
   }
+
   if (merge.refused.empty()) {
     merge.validation = cross_validate(maps, merge.pairs, merge.alignment.a_from_b);
     merge.pairs.insert(merge.pairs.end(), merge.validation.pairs.begin(), merge.validation.pairs.end());
     merge.refused = objection(merge.validation, options);
   }
+
   merge.accepted = merge.refused.empty();
   return merge;
 }
@@ -282,12 +298,14 @@ std::vector<MergeEvidence> find_overlaps(const std::vector<MapPart>& parts,
   std::vector<VerifiedPair> verified(tried.size());
   executor.parallel_for(tried.size(),
                         [&](std::size_t i) { verified[i] = verify_candidate(parts, tried[i], options); });
+
   std::vector<MergeEvidence> merges;
   for (std::size_t a = 0; a < parts.size(); ++a) {
     for (std::size_t b = a + 1; b < parts.size(); ++b) {
       const auto between = [&](const OverlapFinder::Candidate& c) {
         return std::min(c.query_part, c.match_part) == a && std::max(c.query_part, c.match_part) == b;
       };
+
       std::vector<VerifiedPair> pairs;
       std::map<std::string, int> refused;
       for (std::size_t i = 0; i < tried.size(); ++i) {
@@ -295,6 +313,7 @@ std::vector<MergeEvidence> find_overlaps(const std::vector<MapPart>& parts,
         pairs.push_back(verified[i]);
         if (!verified[i].evidence.accepted) ++refused[reason(verified[i].evidence, options.verify)];
       }
+
       MergeEvidence merge = decide_overlap(parts, a, b, pairs, options, executor);
       merge.candidates = static_cast<int>(std::count_if(candidates.begin(), candidates.end(), between));
       merge.tried = static_cast<int>(pairs.size());
@@ -303,6 +322,7 @@ std::vector<MergeEvidence> find_overlaps(const std::vector<MapPart>& parts,
       merges.push_back(std::move(merge));
     }
   }
+
   return merges;
 }
 

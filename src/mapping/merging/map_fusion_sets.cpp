@@ -48,17 +48,20 @@ Alignment mean_alignment(const PartPair& maps, const std::vector<PlacePair>& pai
   constexpr double kFloor_rad = 0.001;
   Alignment mean;
   if (pairs.empty()) return mean;
+
   const maps::Map& a = maps.map_a();
   const maps::Map& b = maps.map_b();
   const auto n = static_cast<double>(pairs.size());
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const PlacePair& pair : pairs) middle += b.camera_from_world(pair.b).inverse().translation / n;
+
   const Rigid3 b_from_middle(Eigen::Matrix3d::Identity(), middle);
   Rigid3 estimate = worlds(a, b, pairs.front()) * b_from_middle;
   std::vector<Vector6d> errors(pairs.size());
   for (int round = 0; round < kRounds; ++round) {
     Vector6d step = Vector6d::Zero();
     double weights = 0.0;
+
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       const Rigid3 said = worlds(a, b, pairs[i]) * b_from_middle;
       errors[i] << said.translation - estimate.translation,
@@ -69,13 +72,16 @@ Alignment mean_alignment(const PartPair& maps, const std::vector<PlacePair>& pai
       step += weight * errors[i];
       weights += weight;
     }
+
     step /= weights;
     estimate.rotation = geometry::exp_so3(step.tail<3>()) * estimate.rotation;
     estimate.translation += step.head<3>();
   }
+
   Matrix6d scatter = Matrix6d::Zero();
   double spread2 = 0.0;
   for (const Vector6d& error : errors) scatter += error * error.transpose();
+
   for (const Vector6d& error : errors) spread2 += error.head<3>().squaredNorm();
   mean.covariance = scatter / (n * std::max(1.0, n - 1.0));
   mean.covariance.diagonal().head<3>().array() += kFloor_m * kFloor_m;

@@ -101,6 +101,7 @@ bool MapOverlay::match(const Side& side, const Landmark& landmark, const Eigen::
   const Eigen::Vector3i low = cloud::cell_of((at - Eigen::Vector3d::Constant(kReach_m)) / kCell_m);
   bool found = false;
   int near = 0;
+
   for (int corner = 0; corner < 8; ++corner) {
     const std::uint64_t key = cloud::pack_cell(corner_of(low, corner));
     auto cell = std::lower_bound(side.cells.begin(), side.cells.end(), key);
@@ -111,6 +112,7 @@ bool MapOverlay::match(const Side& side, const Landmark& landmark, const Eigen::
       found = found || alike(other.descriptor, landmark.descriptor);
     }
   }
+
   sum.matched += found ? 1 : 0;
   sum.chance += 1.0 - std::pow(1.0 - alike_, near);
   return found;
@@ -121,12 +123,14 @@ void MapOverlay::overlay(const Side& moved, const Side& fixed, const Rigid3& fix
   constexpr double kLikeSide = 0.8;  // cosine between the directions from which a landmark was seen
   constexpr double kTimes = 1.8;     // nearer or farther: a corner does not look the same from everywhere
   const std::vector<PlacedView> views = views_of(fixed.part);
+
   const std::size_t step = stride(moved.landmarks.size(), kMostTried);
   for (std::size_t i = 0; i < moved.landmarks.size(); i += step) {
     const Landmark& landmark = moved.landmarks[i];
     const Eigen::Vector3d at = fixed_from_moved * landmark.position;
     const Eigen::Vector3d direction = fixed_from_moved.rotation * landmark.view;
     bool there = false;
+
     bool through = false;
     for (const PlacedView& view : views) {
       const Eigen::Vector3d in_camera = view.camera_from_world * at;
@@ -136,10 +140,12 @@ void MapOverlay::overlay(const Side& moved, const Side& fixed, const Rigid3& fix
         continue;
       }
       if (in_camera.dot(view.camera_from_world.rotation * direction) < kLikeSide * distance) continue;
+
       const Seen what = seen(*view.depth, view.camera, in_camera);
       there = there || what == Seen::kThere;
       through = through || what == Seen::kThrough;
     }
+
     if (there) {
       ++sum.expected;
       if (match(fixed, landmark, at, sum) && matched != nullptr) matched->push_back(at);
@@ -159,6 +165,7 @@ void overlay_surfaces(const MapPart& moved, const MapPart& fixed, const Rigid3& 
   const std::vector<KeyframeId> ids = moved.map->keyframe_ids();
   std::size_t count = 0;
   for (const KeyframeId id : ids) count += moved.map->keyframe(id).surface.size();
+
   const std::size_t step = stride(count, kMostTried);
   std::size_t next = 0;  // of all samples, one keyframe's after the other's
   for (const KeyframeId id : ids) {
@@ -168,6 +175,7 @@ void overlay_surfaces(const MapPart& moved, const MapPart& fixed, const Rigid3& 
       const Eigen::Vector3d at = fixed_from_camera * samples[next].point.cast<double>();
       const Eigen::Vector3d normal = fixed_from_camera.rotation * samples[next].normal.cast<double>();
       bool there = false;
+
       bool through = false;
       for (const PlacedView& view : views) {
         const Eigen::Vector3d in_camera = view.camera_from_world * at;
@@ -177,9 +185,11 @@ void overlay_surfaces(const MapPart& moved, const MapPart& fixed, const Rigid3& 
         there = there || what == Seen::kThere;
         through = through || what == Seen::kThrough;
       }
+
       sum.there += there ? 1 : 0;
       sum.through += through && !there ? 1 : 0;
     }
+
     next -= samples.size();
   }
 }

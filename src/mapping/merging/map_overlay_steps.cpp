@@ -32,11 +32,13 @@ class Peaks {
         counts[cloud::pack_cell(corner_of(cloud::unpack_cell(bin.first), corner, -1))] += bin.second.size();
       }
     }
+
     std::vector<std::pair<std::size_t, std::uint64_t>> blocks;
     for (const auto& [low, count] : counts) blocks.emplace_back(count, low);
     std::sort(blocks.begin(), blocks.end(), [](const auto& x, const auto& y) {
       return x.first != y.first ? x.first > y.first : x.second < y.second;
     });
+
     std::vector<Eigen::Vector3d> result;
     for (const auto& block : blocks) {
       if (result.size() >= most) break;
@@ -44,6 +46,7 @@ class Peaks {
       const auto same = [&](const Eigen::Vector3d& other) { return (other - mean).norm() < 2.0 * kBin_m; };
       if (mean.norm() >= least_m_ && std::none_of(result.begin(), result.end(), same)) result.push_back(mean);
     }
+
     return result;
   }
 
@@ -92,9 +95,11 @@ int MapOverlay::matching_spots(const Rigid3& a_from_b, const Eigen::Vector3d& st
   std::vector<Eigen::Vector3d> in_b;
   overlay(b_, a_, a_from_b, sum, &matched);
   overlay(a_, b_, a_from_b.inverse(), sum, &in_b);
+
   for (const Eigen::Vector3d& at : in_b) matched.push_back(a_from_b * at);
   const Eigen::Vector3d along = step.normalized();
   for (Eigen::Vector3d& at : matched) at -= along.dot(at) * along;
+
   // The fullest spot, then the fullest of the rest.
   for (int spots = 0;; ++spots) {
     std::size_t most = 0;
@@ -102,6 +107,7 @@ int MapOverlay::matching_spots(const Rigid3& a_from_b, const Eigen::Vector3d& st
     const auto near = [](const Eigen::Vector3d& centre) {
       return [&centre](const Eigen::Vector3d& at) { return (at - centre).norm() < kWide_m; };
     };
+
     for (const Eigen::Vector3d& centre : matched) {
       const auto count =
           static_cast<std::size_t>(std::count_if(matched.begin(), matched.end(), near(centre)));
@@ -109,6 +115,7 @@ int MapOverlay::matching_spots(const Rigid3& a_from_b, const Eigen::Vector3d& st
       most = count;
       fullest = centre;
     }
+
     if (most < kFew) return spots;
     matched.erase(std::remove_if(matched.begin(), matched.end(), near(fullest)), matched.end());
   }
@@ -124,9 +131,11 @@ void MapOverlay::vote(const Side& moved, const Side& fixed, const Rigid3& fixed_
       if (id.valid() && map.point(id).observations.size() >= 2) ids.insert(id);
     }
   }
+
   const std::vector<core::PointId> voters(ids.begin(), ids.end());
   std::vector<features::Descriptor256> descriptors;
   for (const Landmark& l : fixed.landmarks) descriptors.push_back(l.descriptor);
+
   std::vector<int> distances(descriptors.size());
   for (std::size_t v = 0; v < voters.size(); v += stride(voters.size(), kMostVoters)) {
     const Landmark voter = landmark(map, voters[v]);

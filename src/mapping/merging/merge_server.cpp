@@ -179,16 +179,19 @@ void MergeServer::decide(const Robots& robots, const NewKeyframe& keyframe) {
       decide_overlap(work_.parts, robots.first, robots.second, pair.verified, options_, *executor_);
   std::set<std::pair<KeyframeId, KeyframeId>> known;
   for (const VerifiedPair& old : pair.verified) known.emplace(old.query, old.match);
+
   for (const VerifiedPair& fresh : merge.pairs) {
     if (known.count({fresh.query, fresh.match}) + known.count({fresh.match, fresh.query}) == 0)
       pair.verified.push_back(fresh);
   }
+
   pair.decided_pairs = pair.verified.size();
   pair.decided_keyframes = a.keyframe_count() + b.keyframe_count();
   if (!merge.accepted) {
     if (pair.met) take_back(robots, merge, keyframe);
     return;
   }
+
   const VerifiedPair& one = merge.pairs[merge.pairs.size() / 2];
   pair.a = a.has_keyframe(one.query) ? one.query : one.match;
   pair.b = pair.a == one.query ? one.match : one.query;
@@ -248,18 +251,21 @@ void MergeServer::update_places() {
   const std::vector<std::size_t> group = connected_parts(work_.parts.size(), all);
   std::vector<std::optional<RobotPlace>> places(group.size());
   for (const std::size_t anchor : group) places[anchor] = RobotPlace{anchor, {}, {}, Matrix6d::Zero()};
+
   std::vector<bool> met(group.size(), false);
   for (bool grown = true; grown;) {
     grown = false;
     for (const MergeEvidence& merge : all) {
       met[merge.a] = met[merge.b] = true;
       if (places[merge.a].has_value() == places[merge.b].has_value()) continue;
+
       const std::size_t next = places[merge.a] ? merge.b : merge.a;
       const RobotPlace& from = *places[places[merge.a] ? merge.a : merge.b];
       const Rigid3 from_next =
           next == merge.b ? merge.alignment.a_from_b : merge.alignment.a_from_b.inverse();
       RobotPlace place{from.anchor, from.anchor_from_robot * from_next, {}, {}};
       const Rigid3 anchor_from_a = next == merge.b ? from.anchor_from_robot : place.anchor_from_robot;
+
       // Kept about the anchor's origin until all are there.
       place.covariance = from.covariance + carried(turned(merge.alignment.covariance, anchor_from_a.rotation),
                                                    -(anchor_from_a * middle(merge, *work_.maps[merge.b])));
@@ -268,6 +274,7 @@ void MergeServer::update_places() {
       break;
     }
   }
+
   for (std::size_t r = 0; r < places.size(); ++r) {
     if (!met[r]) {
       places[r].reset();
@@ -278,6 +285,7 @@ void MergeServer::update_places() {
     places[r]->anchor_from_camera = places[r]->anchor_from_robot * robot_from_camera;
     places[r]->covariance = carried(places[r]->covariance, places[r]->anchor_from_camera.translation);
   }
+
   work_.places = std::move(places);
 }
 

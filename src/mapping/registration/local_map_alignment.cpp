@@ -66,6 +66,7 @@ Overlap overlap_of(const cloud::SurfaceSearch& surface, const cloud::SurfaceSear
   const Eigen::Matrix3f rotation = other_from_surface.rotation.cast<float>();
   const Eigen::Vector3f translation = other_from_surface.translation.cast<float>();
   Overlap found;
+
   std::size_t tried = 0;
   for (std::size_t i = 0; i < cloud.size(); i += 1 + cloud.size() / kTried, ++tried) {
     SurfacePoint p = cloud[i];
@@ -76,6 +77,7 @@ Overlap overlap_of(const cloud::SurfaceSearch& surface, const cloud::SurfaceSear
       found.points.push_back(static_cast<int>(i));
     }
   }
+
   found.share =
       static_cast<double>(found.points.size()) / static_cast<double>(std::max<std::size_t>(1, tried));
   return found;
@@ -113,6 +115,7 @@ class Aligner {
     const double distance = narrow ? 0.5 * options_.distance_m : options_.distance_m;
     const double still = narrow ? kStill_m : 0.02 * options_.distance_m;
     estimation_->setNarrow(narrow);
+
     Icp icp;
     icp.setInputSource(a_.cloud());
     icp.setInputTarget(b_.cloud());
@@ -123,18 +126,22 @@ class Aligner {
     icp.setMaximumIterations(options_.max_iterations);
     icp.setTransformationEpsilon(still * still);
     icp.setTransformationRotationEpsilon(std::cos(still));
+
     SurfaceCloud moved;
     icp.align(moved, result_.b_from_a.isometry().matrix());
     result_.b_from_a = rigid_of(icp.getFinalTransformation());
     pcl::transformPointCloudWithNormals(*a_.cloud(), moved,
                                         result_.b_from_a.isometry().matrix().cast<float>().eval());
+
     pcl::Correspondences found;
     correspondences_->setInputSource(std::make_shared<SurfaceCloud>(moved));
     correspondences_->determineCorrespondences(found, distance);
+
     if (found.size() < kFewest) {
       refuse("the surfaces do not meet");
       return false;
     }
+
     step_ = estimation_->step(moved, *b_.cloud(), found);
     if (icp.getConvergeCriteria()->getConvergenceState() != Criteria::CONVERGENCE_CRITERIA_ITERATIONS)
       return true;

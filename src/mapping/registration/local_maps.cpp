@@ -109,9 +109,11 @@ std::vector<Common> common_voxels(const std::vector<std::vector<std::uint64_t>>&
   for (std::size_t i = 0; i < keys.size(); ++i) {
     for (const std::uint64_t key : keys[i]) filled.emplace_back(key, static_cast<std::uint32_t>(i));
   }
+
   std::sort(filled.begin(), filled.end());
   std::vector<std::vector<std::size_t>> places(keys.size());  // of each local map in `filled`
   for (std::size_t i = 0; i < filled.size(); ++i) places[filled[i].second].push_back(i);
+
   std::vector<std::vector<Common>> found(keys.size());
   executor.parallel_for(keys.size(), [&](std::size_t a) {
     std::vector<std::uint32_t> voxels(keys.size(), 0);
@@ -120,11 +122,13 @@ std::vector<Common> common_voxels(const std::vector<std::vector<std::uint64_t>>&
         ++voxels[filled[k].second];
       }
     }
+
     for (std::size_t b = a + 1; b < keys.size(); ++b) {
       if (voxels[b] > 0)
         found[a].push_back({static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b), voxels[b]});
     }
   });
+
   std::vector<Common> result;
   for (const std::vector<Common>& some : found) result.insert(result.end(), some.begin(), some.end());
   return result;
@@ -182,15 +186,18 @@ std::vector<LocalMapPair> overlapping_pairs(const maps::Map& map, const std::vec
   std::vector<std::vector<std::uint64_t>> keys(local_maps.size());
   executor.parallel_for(local_maps.size(),
                         [&](std::size_t i) { keys[i] = filled_voxels(map, local_maps[i], options.voxel_m); });
+
   std::vector<LocalMapPair> candidates;
   for (const auto& [a, b, voxels] : common_voxels(keys, executor)) {
     const double overlap =
         static_cast<double>(voxels) / static_cast<double>(std::min(keys[a].size(), keys[b].size()));
     if (overlap >= options.min_overlap) candidates.push_back({a, b, overlap});
   }
+
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const LocalMapPair& a, const LocalMapPair& b) { return a.overlap > b.overlap; });
   std::vector<int> taken(local_maps.size(), 0);
+
   std::vector<LocalMapPair> pairs;
   for (const LocalMapPair& pair : candidates) {
     if (taken[pair.a] >= options.per_map && taken[pair.b] >= options.per_map) continue;
@@ -198,9 +205,11 @@ std::vector<LocalMapPair> overlapping_pairs(const maps::Map& map, const std::vec
     ++taken[pair.b];
     pairs.push_back(pair);
   }
+
   std::sort(pairs.begin(), pairs.end(), [](const LocalMapPair& a, const LocalMapPair& b) {
     return std::pair(a.a, a.b) < std::pair(b.a, b.b);
   });
+
   return pairs;
 }
 

@@ -78,9 +78,11 @@ std::optional<maps::SurfaceEdge> align_surface_edge(const maps::Keyframe& a, cor
   optimize::PoseProblem problem;
   problem.camera = camera;
   problem.prior = weak_prior(b_from_a, middle_in_view(surface, b_from_a, camera), options.hold_m);
+
   optimize::PoseSolverOptions solver;
   solver.max_iterations = 3;
   solver.photometric_weight = kPhotometricWeight;
+
   optimize::PoseSummary summary;
   Rigid3 pose = b_from_a;
   const tracking::PhotometricView view{images.of_b, &depth_of_b, depth_from_camera, camera};
@@ -88,20 +90,25 @@ std::optional<maps::SurfaceEdge> align_surface_edge(const maps::Keyframe& a, cor
     tracking::SurfaceAssociationOptions association;
     association.max_distance_m = distance;
     problem.photometric.reset();
+
     if (images.of_a != nullptr && images.of_b != nullptr) {
       const std::size_t level = distance > 0.06 ? 1 : 0;
       problem.photometric = tracking::associate_photometric(*images.of_a, level, view, {}, pose);
     }
+
     problem.planes =
         tracking::associate_surface(surface, depth_of_b, camera, pose, depth_from_camera, association);
     summary = optimize::solve_pose(problem, pose, solver);
+
     if (problem.photometric &&
         !tracking::photometric_agrees(*problem.photometric, summary.camera_from_world)) {
       problem.photometric.reset();
       summary = optimize::solve_pose(problem, pose, solver);
     }
+
     pose = summary.camera_from_world;
   }
+
   const double overlap = static_cast<double>(summary.planes.inliers) / static_cast<double>(surface.size());
   if (overlap < options.min_overlap) return std::nullopt;
   return maps::SurfaceEdge{a.id, b, without_prior(pose, *problem.prior, summary.information),

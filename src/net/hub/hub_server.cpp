@@ -289,6 +289,7 @@ void HubServer::poll() {
 void HubServer::serve(const core::StopToken& stop, const Status& status) {
   auto line_at = Clock::now();
   std::uint64_t before = received_bytes();
+
   while (!stop.stop_requested()) {
     bus_->wait(kWait);
     poll();

@@ -71,6 +71,7 @@ core::Result<void> HubShow::show_robot(const Task& task) {
 
   const auto clouds = store->cloud_ids();
   if (!clouds) return tl::unexpected(clouds.error());
+
   for (const maps::KeyframePose& keyframe : maps::keyframe_poses(stored->map)) {
     const bool there = std::find(clouds->begin(), clouds->end(), keyframe.id) != clouds->end();
     if (!there || !shown_clouds_[task.name].insert(keyframe.id).second) continue;
@@ -79,6 +80,7 @@ core::Result<void> HubShow::show_robot(const Task& task) {
     observer_->added(task.number, keyframe.stamp, keyframe.world_from_camera * cloud::sensor_pose(**cloud),
                      **cloud);
   }
+
   return {};
 }
 

@@ -61,19 +61,23 @@ core::Result<Graph> build_graph(std::optional<ConfigNode> own, const std::filesy
                                 const std::vector<std::string>& overrides, ConfigProblems problems) {
   const auto refuse = [&] { return tl::unexpected(core::to_error(problems)); };
   if (!own) return refuse();
+
   Graph graph;
   graph.file = file;
   const auto root = with_includes(std::move(*own), file, pipelines_folder, problems);
   if (!root) return refuse();
+
   read_description(*root, graph, problems);
   StageSpecs specs = read_stages(*root, registry, problems);
   connect(specs, problems);
   add_taps(*root, registry, specs, problems);
   apply_overrides(overrides, specs, problems);
+
   const CheckContext context{file.parent_path(), pipelines_folder, &registry.filters()};
   for (StageSpec& spec : specs) {
     if (spec.node.stage) check_stage(spec, context, problems);
   }
+
   const std::vector<std::size_t> order = checked_order(specs, problems);
   check_files(specs, problems);
   if (!problems.empty()) return refuse();

@@ -45,15 +45,18 @@ class Connector {
   void connect(StageSpec& spec) {
     const ConfigNode* inputs = spec.body->find("inputs");
     if (spec.node.type == nullptr) return note_uses(spec, inputs);
+
     const std::vector<Port>& ports = spec.node.type->inputs;
     spec.node.inputs.resize(ports.size());
     const std::string path = spec.path + ".inputs";
     const std::size_t before = problems_.size();
+
     if (inputs != nullptr && inputs->kind != Kind::kMap && inputs->kind != Kind::kNull) {
       problems_.push_back({inputs->mark, path, "must be a map, e.g. {frame: read}"});
       spec.dangling = true;
       return;
     }
+
     meant_.clear();
     if (inputs != nullptr) {
       for (std::size_t i = 0; i < inputs->entries.size(); ++i) {
@@ -61,6 +64,7 @@ class Connector {
         connect_one(spec, name, inputs->key_marks[i], from);
       }
     }
+
     for (const Port& port : ports) {
       if (!port.required || (inputs != nullptr && inputs->find(port.name) != nullptr)) continue;
       if (std::find(meant_.begin(), meant_.end(), port.name) != meant_.end())
@@ -69,6 +73,7 @@ class Connector {
           {inputs != nullptr ? inputs->mark : spec.mark, path,
            fmt::format("the input {} is missing ({})", port.name, givers(specs_, port.type))});
     }
+
     spec.dangling = problems_.size() != before;
   }
 
@@ -86,6 +91,7 @@ class Connector {
     const auto problem = [&](const ConfigMark& at, std::string what) {
       problems_.push_back({at, spec.path + ".inputs." + name, std::move(what)});
     };
+
     const std::vector<Port>& ports = spec.node.type->inputs;
     const auto port = std::find_if(ports.begin(), ports.end(), [&](const Port& p) { return p.name == name; });
     if (port == ports.end()) {
@@ -96,6 +102,7 @@ class Connector {
                                          : "unknown input" + core::hint(name, names));
     }
     if (from.kind != Kind::kScalar) return problem(from.mark, "must be a stage or stage.port");
+
     const std::size_t dot = from.scalar.find('.');
     const std::string stage_name = from.scalar.substr(0, dot);
     const std::size_t giver = find_spec(specs_, stage_name);
@@ -103,15 +110,18 @@ class Connector {
       return problem(from.mark, fmt::format("there is no stage '{}'{}", stage_name.substr(0, 40),
                                             core::hint(stage_name, names_of(specs_))));
     }
+
     spec.reads_from.push_back(giver);
     const StageTypePtr& type = specs_[giver].node.type;
     if (type == nullptr) return;  // reported already
+
     const auto output =
         fitting_output(*type, dot == std::string::npos ? "" : from.scalar.substr(dot + 1), port->type);
     if (output) {
       spec.node.inputs[static_cast<std::size_t>(port - ports.begin())] = OutputRef{giver, *output};
       return;
     }
+
     std::vector<std::string> given;
     for (const Port& p : type->outputs) given.push_back(p.name + " (" + p.type.name + ")");
     problem(from.mark, fmt::format("'{}' does not give the {} that is needed here; it gives {} ({})",

@@ -43,6 +43,7 @@ std::string to_dot(const Graph& graph) {
   if (!graph.description.empty()) {
     text += fmt::format("  label={};\n  fontname=\"sans-serif\";\n", quoted(graph.description));
   }
+
   for (const Node& node : graph.nodes) text += box(node);
   for (const Node& node : graph.nodes) {
     for (const auto& input : node.inputs) {
@@ -53,6 +54,7 @@ std::string to_dot(const Graph& graph) {
                           quoted(type.name), type.rate == Rate::kEnd ? ", style=dashed" : "");
     }
   }
+
   return text + "}\n";
 }
 

@@ -51,6 +51,7 @@ void check_files(const StageSpecs& specs, core::ConfigProblems& problems) {
   for (const StageSpec& spec : specs) {
     if (!spec.node.stage) continue;
     const std::size_t others = writers.size();
+
     for (const std::string& file : spec.node.stage->files()) {
       const std::string normal = std::filesystem::path(file).lexically_normal().generic_string();
       const auto taken = std::find_if(writers.begin(), writers.begin() + static_cast<std::ptrdiff_t>(others),
@@ -61,6 +62,7 @@ void check_files(const StageSpecs& specs, core::ConfigProblems& problems) {
                                         taken->file == normal ? "" : fmt::format(" ({})", taken->file))});
         break;  // one is enough: two stages of a kind share all their files
       }
+
       writers.push_back({spec.path, normal});
     }
   }

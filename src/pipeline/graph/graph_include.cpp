@@ -101,6 +101,7 @@ class Includer {
       problems_.push_back({own.mark, "", "a pipeline is a map with the keys description and stages"});
       return std::nullopt;
     }
+
     check_top(own);
     const auto includes = words(own, "include", "include: rgbd.yaml", problems_);
     const auto removes = words(own, "remove", "remove: [refine]", problems_);
@@ -111,17 +112,21 @@ class Includer {
       }
       return own.find("include") == nullptr ? std::optional(std::move(own)) : std::nullopt;
     }
+
     open_.push_back(fs::weakly_canonical(file));
     ConfigNode base;
     base.kind = Kind::kMap;
+
     bool complete = true;
     for (const ConfigNode* include : includes) {
       std::optional<ConfigNode> included = read(*include, file);
       if (included) merge(*included, base);
       complete = complete && included.has_value();
     }
+
     open_.pop_back();
     if (!complete) return std::nullopt;
+
     for (const ConfigNode* name : removes) remove(*name, base);
     drop_unknown_changes(own, base);
     base.mark = own.mark;
@@ -148,12 +153,14 @@ class Includer {
       problems_.push_back({name.mark, "include", what});
       return std::nullopt;
     };
+
     const fs::path file = resolve(name.scalar, from.parent_path());
     if (file.empty()) {
       return refuse(fmt::format(
           "there is no '{}' beside this file, and no shipped pipeline of that name{}", name.scalar,
           core::hint(fs::path(name.scalar).stem().string(), core::yaml_names(pipelines_folder_))));
     }
+
     const fs::path canonical = fs::weakly_canonical(file);
     const auto again = std::find(open_.begin(), open_.end(), canonical);
     if (again != open_.end()) {
@@ -163,6 +170,7 @@ class Includer {
       return refuse(fmt::format("the files include each other in a circle ({})", fmt::join(circle, " -> ")));
     }
     if (++files_ > kMaxFiles) return refuse(fmt::format("includes more than {} files", kMaxFiles));
+
     std::optional<ConfigNode> tree = core::read_yaml(file, problems_);
     if (!tree) return std::nullopt;
     return expand(std::move(*tree), file);

@@ -27,25 +27,30 @@ void apply(const std::string& text, StageSpecs& specs, ConfigProblems& problems)
   const auto refuse = [&](const std::string& path, std::string what) {
     problems.push_back({kCommandLine, path, std::move(what)});
   };
+
   const std::size_t equals = text.find('=');
   const std::size_t dot = text.find('.');
   if (equals == std::string::npos || dot == std::string::npos || dot == 0 || dot + 1 >= equals) {
     return refuse(text, "write it as stage.key=value, e.g. --set features.points=off");
   }
+
   const std::string path = text.substr(0, equals);
   const std::string stage = text.substr(0, dot);
   const std::string key = text.substr(dot + 1, equals - dot - 1);
   auto value = core::parse_yaml(text.substr(equals + 1), path);
   if (!value) return refuse(path, "the value is not valid YAML");
+
   if (equals + 1 == text.size()) value->kind = ConfigNode::Kind::kScalar;  // "stage.key=" is the empty text
   place_on_command_line(*value);
   const std::size_t target = find_spec(specs, stage);
   if (target == specs.size()) {
     return refuse(path, fmt::format("there is no stage '{}'{}", stage, core::hint(stage, names_of(specs))));
   }
+
   if (key == "type" || key == "inputs") {
     return refuse(path, "only options can be set; change the graph in a pipeline file");
   }
+
   if (specs[target].node.type == nullptr) return;  // reported already
   specs[target].node.options.set(key, *value, stage, problems);
   specs[target].set.push_back(key);

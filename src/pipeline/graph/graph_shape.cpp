@@ -43,13 +43,16 @@ std::vector<std::size_t> sorted(const StageSpecs& specs, ConfigProblems& problem
       if (!placed[next] && std::all_of(from.begin(), from.end(), [&](std::size_t f) { return placed[f]; }))
         break;
     }
+
     if (next == specs.size()) {
       report_cycle(specs, placed, problems);
       break;
     }
+
     placed[next] = true;
     order.push_back(next);
   }
+
   // Taps come last, so that their writing counts as export and delays no stage.
   std::stable_partition(order.begin(), order.end(), [&](std::size_t d) { return !specs[d].node.tap; });
   return order;

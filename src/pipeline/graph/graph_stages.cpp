@@ -25,12 +25,14 @@ void read_stage(const StageRegistry& registry, StageSpec& spec, ConfigProblems& 
     problems.push_back({spec.mark, spec.path, "must be a map with a type, e.g. {type: read}"});
     return;
   }
+
   const ConfigNode* type = body.find("type");
   if (type == nullptr || type->kind != Kind::kScalar) {
     problems.push_back({type != nullptr ? type->mark : spec.mark, spec.path,
                         fmt::format("needs a type (allowed: {})", fmt::join(registry.names(), ", "))});
     return;
   }
+
   spec.node.type = registry.find(type->scalar);
   if (spec.node.type == nullptr) {
     problems.push_back({type->mark, spec.path + ".type",
@@ -38,6 +40,7 @@ void read_stage(const StageRegistry& registry, StageSpec& spec, ConfigProblems& 
                                     core::hint(type->scalar, registry.names()))});
     return;
   }
+
   spec.node.stage = spec.node.type->make();
   spec.node.stage->declare(spec.node.options);
   spec.node.options.set_all(body, spec.path, problems, {"type", "inputs"});
@@ -67,12 +70,14 @@ StageSpecs read_stages(const ConfigNode& root, const StageRegistry& registry, Co
                         "must be a map of stages, e.g. read: {type: read}"});
     return specs;
   }
+
   for (std::size_t i = 0; i < stages->entries.size(); ++i) {
     const auto& [name, body] = stages->entries[i];
     if (!is_stage_name(name)) {
       problems.push_back({stages->key_marks[i], "stages." + name,
                           "a stage's name is made of a-z, 0-9 and _, a letter first"});
     }
+
     StageSpec spec;
     spec.node.name = name;
     spec.mark = stages->key_marks[i];
@@ -81,6 +86,7 @@ StageSpecs read_stages(const ConfigNode& root, const StageRegistry& registry, Co
     read_stage(registry, spec, problems);
     specs.push_back(std::move(spec));
   }
+
   return specs;
 }
 

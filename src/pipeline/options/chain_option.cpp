@@ -25,6 +25,7 @@ void ChainOption::check(const CheckContext& context, const std::string& path,
     chain_ = cloud::FilterChain::parse_list(value_, path, *context.filters, problems);
   } else if (!value_.scalar.empty()) {
     const std::filesystem::path file = context.find(value_.scalar, value_.mark);
+
     if (file.empty()) {
       problems.push_back({value_.mark, path + ".filters",
                           fmt::format("{}: no such file {} or among the shipped ones", value_.scalar,
@@ -32,10 +33,12 @@ void ChainOption::check(const CheckContext& context, const std::string& path,
                                                                            : "beside the pipeline")});
       return;
     }
+
     const auto tree = core::read_yaml(file, problems);
     if (tree) chain_ = cloud::FilterChain::parse(*tree, "", *context.filters, problems);
   }
   if (problems.size() != before) return;
+
   if (auto fit = chain_.ready(); !fit)
     problems.push_back({value_.mark, path + ".filters", fit.error().message});
   const core::ConfigMark mark = value_.mark;

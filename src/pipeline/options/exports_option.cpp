@@ -33,27 +33,33 @@ void ExportsOption::add(const core::ConfigNode& entry, const std::string& path,
   const std::size_t own = table.specs().size();
   request.options.declare(table);
   const std::size_t before = problems.size();
+
   if (entry.kind == Kind::kScalar) {
     words.file = entry.scalar;
   } else {
     table.set_all(entry, path, problems);
   }
   if (problems.size() != before) return;
+
   for (std::size_t i = own; i < table.specs().size(); ++i) {
     if (entry.find(table.specs()[i].key) != nullptr) request.given.insert(table.specs()[i].key);
   }
+
   request.output = words.file;
   request.format = words.format;
   request.content = content_of(words.what);
+
   if (words.file.empty() || leaves_folder(request.output)) {
     problems.push_back(
         {entry.mark, path, "an export names a file below the result folder, such as grid.yaml"});
     return;
   }
+
   if (auto fits = exports::check_export(request); !fits) {
     problems.push_back({entry.mark, path, fits.error().message});
     return;
   }
+
   requests_.push_back(std::move(request));
 }
 

@@ -59,6 +59,7 @@ core::Result<DebugFolder> DebugFolder::prepare(const fs::path& folder, const fs:
         fmt::format("{}: holds the result folder {}; debug pictures need a folder of their own",
                     folder.string(), out.string()));
   }
+
   const fs::path relative = inside(out, folder);
   if (relative.empty()) {
     auto own = maps::OutputFolder::prepare(folder, replace, false, is_debug_folder);
@@ -67,6 +68,7 @@ core::Result<DebugFolder> DebugFolder::prepare(const fs::path& folder, const fs:
     result.own_.emplace(std::move(*own));
     return result;
   }
+
   result.path_ = out_path / relative;
   if (auto made = core::make_folder(result.path_); !made) return tl::unexpected(made.error());
   return result;

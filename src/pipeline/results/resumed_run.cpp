@@ -162,17 +162,21 @@ core::Result<std::optional<ResumedRun>> open_resumed(const fs::path& folder, con
     remove_store(run.store);
     return std::nullopt;
   }
+
   const auto reader = maps::StoreReader::open(run.store);
   if (!reader) return tl::unexpected(reader.error());
+
   auto maps = reader->load_each();
   if (!maps) return tl::unexpected(maps.error());
   if (maps->size() == 1 && maps->front().map.keyframe_count() == 0) {
     remove_store(run.store);
     return std::nullopt;
   }
+
   const maps::StoreHeader& header = reader->header();
   if (auto same = check_same(run.store, "recording", header.input, input); !same)
     return tl::unexpected(same.error());
+
   for (const RobotInfo& robot : header.robots) {
     const sensor::Camera camera = maps::camera_of(recordings.robots(), robot.number);
     if (auto same = check_same(run.store, "camera", sensor::to_yaml(robot.camera), sensor::to_yaml(camera));
@@ -180,12 +184,15 @@ core::Result<std::optional<ResumedRun>> open_resumed(const fs::path& folder, con
       return tl::unexpected(same.error());
     }
   }
+
   if (auto same = check_same(run.store, "configuration", header.configuration, configuration); !same) {
     return tl::unexpected(same.error());
   }
+
   for (const maps::StoredMap& stored : *maps) {
     if (auto rows = add_rows(run.store, stored.log, run.rows); !rows) return tl::unexpected(rows.error());
   }
+
   take_maps(std::move(*maps), recordings.robots().size(), run);
   if (auto found = find_done(recordings, run); !found) return tl::unexpected(found.error());
   return run;

@@ -28,9 +28,11 @@ std::optional<double> wall_angle(const cloud::Cloud& cloud, const Eigen::Matrix3
     const double turn = angle / kQuarter;
     return static_cast<int>((turn - std::floor(turn)) * kBins) % kBins;
   };
+
   std::array<double, kBins> weight{};
   std::array<Eigen::Vector2d, kBins> sum;
   sum.fill(Eigen::Vector2d::Zero());
+
   double all = 0.0;
   for (const cloud::Point& p : cloud) {
     const Eigen::Vector3d normal = axes.transpose() * p.getNormalVector3fMap().cast<double>();
@@ -41,6 +43,7 @@ std::optional<double> wall_angle(const cloud::Cloud& cloud, const Eigen::Matrix3
     sum[b] += Eigen::Vector2d(std::cos(4.0 * angle), std::sin(4.0 * angle));
     all += 1.0;
   }
+
   const auto near = [&](const auto& of, int middle) {
     auto result = of[static_cast<std::size_t>(middle)];
     for (int k = 1; k <= kNear; ++k) {
@@ -49,10 +52,12 @@ std::optional<double> wall_angle(const cloud::Cloud& cloud, const Eigen::Matrix3
     }
     return result;
   };
+
   int best = 0;
   for (int b = 1; b < kBins; ++b) {
     if (near(weight, b) > near(weight, best)) best = b;
   }
+
   if (all == 0.0 || near(weight, best) < kLeastShare * all) return std::nullopt;
   const Eigen::Vector2d mean = near(sum, best);
   return std::atan2(mean.y(), mean.x()) / 4.0;
@@ -64,10 +69,12 @@ UpFrame find_up(Up wanted, Yaw yaw, const cloud::CloudConstPtr& cloud,
                 const geometry::Trajectory& trajectory) {
   UpFrame frame;
   if (wanted == Up::kNone || trajectory.empty()) return frame;
+
   const geometry::Rigid3& first = trajectory.front().world_from_camera;
   Eigen::Vector3d up = -first.rotation.col(1);
   double ground = up.dot(first.translation);
   frame.up = "camera";
+
   if (wanted == Up::kFloor) {
     if (const auto floor = cloud::find_floor(cloud, viz::mean_camera_up({trajectory}))) {
       up = floor->normal;
@@ -75,12 +82,14 @@ UpFrame find_up(Up wanted, Yaw yaw, const cloud::CloudConstPtr& cloud,
       frame.up = "floor";
     }
   }
+
   Eigen::Vector3d ahead = first.rotation.col(2) - first.rotation.col(2).dot(up) * up;
   if (ahead.norm() < 0.1) ahead = first.rotation.col(1) - first.rotation.col(1).dot(up) * up;
   Eigen::Matrix3d axes;  // of the output in the map
   axes.col(2) = up.normalized();
   axes.col(0) = ahead.normalized();
   axes.col(1) = axes.col(2).cross(axes.col(0));
+
   const auto walls = yaw == Yaw::kWalls && cloud != nullptr ? wall_angle(*cloud, axes) : std::nullopt;
   frame.yaw = walls ? "walls" : "camera";
   if (walls) axes *= Eigen::AngleAxisd(*walls, Eigen::Vector3d::UnitZ()).toRotationMatrix();

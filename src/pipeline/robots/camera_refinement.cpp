@@ -76,10 +76,12 @@ bool CameraRefinement::ask(const maps::Map& map, const std::vector<maps::FramePo
     options.focal_prior = 0.1;
     options.centre_prior_px = 20.0;
   }
+
   const auto found =
       mapping::calibrate_camera({{&map, &frames, robot_.camera.color}}, camera_, options, executor);
   ++report_.asked;
   if (robot_.camera.guess) report_.doubt = doubt_of(found);
+
   if (!found) {
     if (report_.asked == 1) report_.note = found.error().message;
     log.debug(fmt::format("{}: the camera is as given: {}", robot_.name, found.error().message));
@@ -93,11 +95,13 @@ bool CameraRefinement::ask(const maps::Map& map, const std::vector<maps::FramePo
   report_.note.clear();
   const bool better = !found_text(found->findings).empty();
   if (!better && report_.asked > 1) return false;
+
   std::vector<mapping::CameraFinding> findings = found->findings;
   keep_earlier(options.earlier, findings);
   report_.findings = std::move(findings);
   report_.gain = 1.0 - (1.0 - report_.gain) * (1.0 - found->gain);
   if (!better) return false;
+
   camera_ = found->camera;
   camera_.guess = false;
   log.info(

@@ -29,6 +29,7 @@ viz::Scene scene_of(const mapping::FusedMap& preview, const std::vector<std::str
     cloud->push_back(point);
     scene.scalars.push_back(static_cast<float>(robot));
   };
+
   for (const KeyframeId id : preview.map.keyframe_ids()) {
     const Rigid3 world_from_camera = preview.map.camera_from_world(id).inverse();
     for (const maps::SurfaceSample& sample : preview.map.keyframe(id).surface) {
@@ -36,10 +37,12 @@ viz::Scene scene_of(const mapping::FusedMap& preview, const std::vector<std::str
           world_from_camera.rotation * sample.normal.cast<double>(), id.robot);
     }
   }
+
   for (const core::PointId id : preview.map.point_ids()) {
     const maps::MapPoint& point = preview.map.point(id);
     add(point.position, point.normal, id.robot);
   }
+
   scene.cloud = cloud;
   const std::vector<maps::KeyframePose> keyframes = maps::keyframe_poses(preview.map);
   for (const std::size_t robot : preview.parts) {
@@ -49,6 +52,7 @@ viz::Scene scene_of(const mapping::FusedMap& preview, const std::vector<std::str
     path.trajectory = maps::trajectory(keyframes, static_cast<std::int32_t>(robot));
     scene.paths.push_back(std::move(path));
   }
+
   return scene;
 }
 
@@ -59,6 +63,7 @@ std::string text_of(const Meeting& meeting, const MeetingEvent& event,
     robots.push_back({{"name", names[event.preview->parts[i]]},
                       {"frame_from_robot", rows(event.preview->anchor_from_part[i])}});
   }
+
   Json json = {
       {"number", meeting.number},
       {"preview", true},
@@ -71,6 +76,7 @@ std::string text_of(const Meeting& meeting, const MeetingEvent& event,
       {"robots", robots},
       {"pairs_refused_by_graph", event.preview->rejected},
       {"evidence", section_of(RobotMerge{meeting.a, meeting.b, -1.0, -1.0, event.evidence})}};
+
   if (meeting.time_s >= 0.0) json["time_s"] = meeting.time_s;
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -83,6 +89,7 @@ core::Result<void> MeetingLog::note(const MeetingEvent& event, const std::vector
   const std::string& b = names[event.b];
   const std::string keyframe = fmt::format("keyframe {} of {}", event.keyframe.index,
                                            names[static_cast<std::size_t>(event.keyframe.robot)]);
+
   switch (event.step) {
     case MeetingStep::kNone:
       return {};
@@ -92,6 +99,7 @@ core::Result<void> MeetingLog::note(const MeetingEvent& event, const std::vector
     case MeetingStep::kVerified:
       log_->debug(fmt::format("{} and {}: a common place is verified {} ({})", a, b, when, keyframe));
       return {};
+
     case MeetingStep::kLocalMapAsked:
       log_->debug(fmt::format("{} and {}: the local maps around it are requested {}", a, b, when));
       return {};
@@ -102,12 +110,14 @@ core::Result<void> MeetingLog::note(const MeetingEvent& event, const std::vector
                       a, b, when, event.evidence.consistency.agreeing,
                       1e3 * event.evidence.alignment.spread_m, event.preview->parts.size()));
       return write(event, names, when);
+
     case MeetingStep::kTakenBack:
       meetings_.push_back({static_cast<int>(meetings_.size()) + 1, a, b, time_s, event.frame, true});
       log_->warning(
           fmt::format("{} and {} have not met after all, {}: {}", a, b, when, event.evidence.refused));
       return {};
   }
+
   return {};
 }
 

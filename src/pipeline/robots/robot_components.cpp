@@ -30,10 +30,12 @@ RobotComponents components_of(const RobotMap& whole) {
           std::count_if(frames.begin(), frames.end(), [](const auto& frame) { return frame.tracked; }));
       continue;
     }
+
     const std::size_t number = result.maps.size() + 1;
     result.maps.push_back({number == 1 ? whole.name : fmt::format("{}-{}", whole.name, number), whole.robots,
                            std::move(map), std::move(frames), true});
   }
+
   if (result.maps.size() == 1) result.maps.front().component = false;
   return result;
 }

@@ -108,6 +108,7 @@ Json section_of(const RobotMerge& merge) {
   const mapping::PairTotals totals = e.totals();
   Json refused = Json::object();
   for (const auto& [why, count] : e.refused_pairs) refused[why] = count;
+
   Json entry = {{"a", merge.a},
                 {"b", merge.b},
                 {"accepted", e.accepted},
@@ -130,10 +131,12 @@ Json section_of(const RobotMerge& merge) {
                 {"span_m", rounded(e.consistency.span_m)},
                 {"span_rad", rounded(e.consistency.span_rad)},
                 {"spread_m", rounded(e.alignment.spread_m)}};
+
   if (e.ambiguity.alternative_m > 0.0) {
     entry["alternative_m"] = rounded(e.ambiguity.alternative_m);
     entry["alternative_overlay"] = laid(e.ambiguity.alternative_overlap);
   }
+
   if (e.accepted) add_alignment(e.alignment, entry);
   if (merge.time_s >= 0.0) entry["time_s"] = rounded(merge.time_s);
   if (merge.evident_s >= 0.0) entry["evident_s"] = rounded(merge.evident_s);
@@ -150,6 +153,7 @@ MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor
   if (anchor >= parts.size()) {
     anchor = largest_group(parts, mapping::connected_parts(parts.size(), evidence));
   }
+
   mapping::FusedMap fused = mapping::fuse_maps(maps, evidence, anchor, options);
   MergedRobots result;
   for (mapping::MergeEvidence& merge : evidence) {
@@ -158,9 +162,11 @@ MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor
     result.merges.push_back({a, b, -1.0, -1.0, std::move(merge)});
     report(result.merges.back(), log);
   }
+
   result.unconnected = left_out(parts, fused.parts, result.merges);
   auto map = std::make_shared<MapResult>();
   map->map = std::make_shared<maps::Map>(std::move(fused.map));
+
   std::vector<const RobotMap*> used;
   for (const std::size_t p : fused.parts) {
     used.push_back(&parts[p]);
@@ -169,12 +175,14 @@ MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor
       if (std::none_of(map->robots.begin(), map->robots.end(), same)) map->robots.push_back(robot);
     }
   }
+
   map->frame_poses = frames_of(used);
   take_poses_from_map(*map);
   map->apart = components_apart(parts, fused.parts);
   log.debug(
       fmt::format("fused {} maps: {} pairs of keyframes, {} rejected; {} points and {} lines were duplicates",
                   fused.parts.size(), fused.edges, fused.rejected, fused.merged_points, fused.merged_lines));
+
   result.refused = static_cast<std::size_t>(fused.refused);
   if (fused.refused > 0)
     log.warning("merge: maps are moved into one frame, but not deformed: " + fused.refusal);

@@ -71,21 +71,26 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
   const auto began = RunClock::now();
   auto graph = load_fusion(request);
   if (!graph) return tl::unexpected(graph.error());
+
   const auto maps = open_maps(request, executor);
   if (!maps) return tl::unexpected(maps.error());
   auto output = maps::OutputFolder::prepare(request.output, request.replace);
   if (!output) return tl::unexpected(output.error());
+
   RunContext context = context_of(request, **maps, *graph, output->path());
   context.executor = &executor;
   context.log = &log;
   context.stop = stop;
   if (auto ok = core::write_file(output->path() / "config.yaml", context.store.configuration); !ok)
     return tl::unexpected(ok.error());
+
   const auto report = run_graph(*graph, context, progress);
   if (!report) return tl::unexpected(report.error());
+
   RunSummary summary = summary_of_run(*graph, *report, request, context.input.text, 0.0, began, executor);
   if (auto ok = commit_result(summary, *output, *graph, request, context); !ok)
     return tl::unexpected(ok.error());
+
   return summary;
 }
 

@@ -80,6 +80,7 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_input(const std::string
     return core::usage_error(
         fmt::format("{}: is a recording; --record and --for are for live cameras (ros2://DOMAIN)", input));
   }
+
   if (!synth::is_synth_url(input)) return dataset::open_recording(input, options, log);
   if (!options.camera.empty()) {
     return core::usage_error(
@@ -87,6 +88,7 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_input(const std::string
                     "(plumbline synth), and map that with --camera",
                     input, options.camera));
   }
+
   auto source = synth::open_synth(input, scenes_folder, executor, log);
   if (!source) return source;
   return select_frames(std::move(*source), options.from_s, options.to_s, options.every);

@@ -36,23 +36,28 @@ std::string config_text(const MapRequest& request, const Graph& graph, int threa
       core::version());
   text += "run:\n";
   text += fmt::format("  input: {}\n  pipeline: {}\n", quoted(request.input), quoted(request.pipeline));
+
   for (std::size_t i = 0; i < request.others.size(); ++i) {
     text += fmt::format("  input{}: {}\n", i + 2, quoted(request.others[i]));
   }
+
   text +=
       fmt::format("  camera: {}\n  format: {}\n", quoted(request.open.camera), quoted(request.open.format));
   text += fmt::format("  from: {} s\n", request.open.from_s);
   constexpr double kWhole_s = 1e299;
   if (request.open.to_s < kWhole_s) text += fmt::format("  to: {} s\n", request.open.to_s);
   text += fmt::format("  every: {}\n", request.open.every);
+
   const dataset::TopicNames& topics = request.open.topics;
   const std::pair<const char*, const std::string&> named[] = {{"color", topics.color},
                                                               {"depth", topics.depth},
                                                               {"info", topics.info},
                                                               {"depth_info", topics.depth_info}};
+
   for (const auto& [what, topic] : named) {
     if (!topic.empty()) text += fmt::format("  topic_{}: {}\n", what, quoted(topic));
   }
+
   if (request.feedback != nullptr) text += "  feedback: on\n";
   if (request.open.poses == dataset::PoseUse::kIgnore) text += "  poses: ignore\n";
   if (threads > 0) text += fmt::format("  threads: {}\n", threads);
@@ -85,6 +90,7 @@ MapRequest in_order(MapRequest request) {
     std::string folder;
     std::string given;
   };
+
   std::vector<Input> inputs;
   request.others.push_back(request.input);
   for (const std::string& given : request.others) {
@@ -92,9 +98,11 @@ MapRequest in_order(MapRequest request) {
     const std::filesystem::path folder = std::filesystem::weakly_canonical(given, ec);
     inputs.push_back({folder.filename().string(), folder.string(), given});
   }
+
   std::sort(inputs.begin(), inputs.end(), [](const Input& a, const Input& b) {
     return std::tie(a.name, a.folder, a.given) < std::tie(b.name, b.folder, b.given);
   });
+
   request.input = inputs.front().given;
   for (std::size_t i = 1; i < inputs.size(); ++i) request.others[i - 1] = inputs[i].given;
   request.others.pop_back();
@@ -108,9 +116,11 @@ core::Result<std::unique_ptr<RobotRecordings>> open_inputs(const MapRequest& req
     one.push_back(request.live->recording());
     return std::make_unique<RobotRecordings>(std::move(one));
   }
+
   const std::filesystem::path scenes = request.pipelines_folder / "scenes";
   std::vector<std::string> inputs{request.input};
   inputs.insert(inputs.end(), request.others.begin(), request.others.end());
+
   for (const std::string& input : inputs) {
     if (inputs.size() > 1 && dataset::is_live_address(input)) {
       return core::usage_error(fmt::format(
@@ -118,6 +128,7 @@ core::Result<std::unique_ptr<RobotRecordings>> open_inputs(const MapRequest& req
           input));
     }
   }
+
   std::vector<std::unique_ptr<dataset::FrameSource>> all;
   for (const std::string& input : inputs) {
     dataset::OpenOptions open = request.open;
@@ -126,6 +137,7 @@ core::Result<std::unique_ptr<RobotRecordings>> open_inputs(const MapRequest& req
     if (!recording) return tl::unexpected(recording.error());
     all.push_back(std::move(*recording));
   }
+
   return std::make_unique<RobotRecordings>(std::move(all));
 }
 
@@ -224,11 +236,13 @@ class MapRun {
     for (const RobotInfo& robot : source_->robots()) cameras.push_back(robot.camera);
     if (auto ok = write_cameras(output_->path(), source_->robots(), cameras); !ok)
       return tl::unexpected(ok.error());
+
     if (request_.live != nullptr) request_.live->keep_in(output_->path());
     if (request_.prepared) request_.prepared(output_->path());
     const auto report = run_graph(graph_, context, progress, request_.pace_hz);
     if (!report && source_->given_up()) return tl::unexpected(report.error());
     if (!report) return tl::unexpected(with_what_is_kept(report.error(), *output_));
+
     const auto recorded = source_->finish();
 
     std::string input = request_.input;
@@ -238,10 +252,12 @@ class MapRun {
       return tl::unexpected(with_what_is_kept(ok.error(), *output_));
     if (auto ok = commit_result(summary, *output_, graph_, request_, context); !ok)
       return tl::unexpected(with_what_is_kept(ok.error(), *output_));
+
     if (debug_) {
       if (auto committed = debug_->commit(); !committed) return tl::unexpected(committed.error());
     }
     if (!recorded) return tl::unexpected(recorded.error());
+
     return summary;
   }
 
@@ -251,6 +267,7 @@ class MapRun {
     auto output = maps::OutputFolder::prepare(request_.output, request_.replace, request_.resume);
     if (!output) return tl::unexpected(output.error());
     output_.emplace(std::move(*output));
+
     if (request_.resume) {
       auto opened =
           open_resumed(output_->path(), config_text(request_, graph_, 0), input_text(*source_), *source_);
@@ -258,9 +275,11 @@ class MapRun {
       resumed_ = std::move(*opened);
       report_resumed(output_->path(), resumed_, log_);
     }
+
     const std::string config = config_text(request_, graph_, executor_.threads());
     if (auto written = core::write_file(output_->path() / "config.yaml", config); !written) return written;
     if (request_.debug_video.empty()) return {};
+
     auto debug =
         DebugFolder::prepare(request_.debug_video, request_.output, output_->path(), request_.replace);
     if (!debug) return tl::unexpected(debug.error());
@@ -272,6 +291,7 @@ class MapRun {
     RunContext context;
     context.executor = &executor_;
     context.log = &log_;
+
     // A live camera ends by itself on request, and all frames that arrived are mapped.
     context.stop = source_->live() && request_.live == nullptr ? core::StopToken() : stop;
     context.output_folder = output_->path();
@@ -279,10 +299,12 @@ class MapRun {
     context.input.recordings = source_.get();
     context.input.robots = &source_->robots();
     context.input.text = input_text(*source_);
+
     if (resumed_) context.resumed = &*resumed_;
     context.store.configuration = config_text(request_, graph_, 0);
     context.store.keeps_map = any_stage(graph_, &Stage::keeps_map);
     context.store.keeps_clouds = keeps_clouds(graph_);
+
     if (debug_) context.hooks.debug_folder = debug_->path();
     context.hooks.feedback = request_.feedback;
     context.hooks.alter_map = request_.alter_map;

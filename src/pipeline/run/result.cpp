@@ -53,9 +53,11 @@ core::Result<void> write_exports(const std::filesystem::path& folder, const Grap
       wanted.input = folder;
       wanted.output = folder / wanted.output;
       wanted.open = recording_opener(request, context);
+
       if (wanted.output.has_parent_path()) {
         if (auto made = core::make_folder(wanted.output.parent_path()); !made) return made;
       }
+
       const auto summary = exports::write_export(wanted, *context.executor, *context.log, nullptr);
       if (!summary && summary.error().kind == core::ErrorKind::kOutput)
         return tl::unexpected(summary.error());
@@ -63,6 +65,7 @@ core::Result<void> write_exports(const std::filesystem::path& folder, const Grap
         context.log->warning(fmt::format("exports: {} is left out: {}", name, summary.error().message));
     }
   }
+
   return {};
 }
 

@@ -18,26 +18,31 @@ RobotRecordings::RobotRecordings(std::vector<std::unique_ptr<dataset::FrameSourc
   const auto is_live = [](const auto& recording) { return recording->live(); };
   if (recordings_.size() > 1 && std::any_of(recordings_.begin(), recordings_.end(), is_live))
     throw std::invalid_argument("RobotRecordings: one of several is live");
+
   std::set<std::string> taken;
   double latest_start = std::numeric_limits<double>::lowest();
   double earliest_start = std::numeric_limits<double>::max();
+
   double earliest_end = std::numeric_limits<double>::max();
   for (const auto& recording : recordings_) {
     RobotInfo robot;
     robot.number = static_cast<std::int32_t>(robots_.size());
     robot.name = recording->name();
+
     for (int i = 2; !taken.insert(robot.name).second; ++i)
       robot.name = fmt::format("{}-{}", recording->name(), i);
     robot.camera = recording->camera();
     name_ += (name_.empty() ? "" : " ") + robot.name;
     robots_.push_back(std::move(robot));
     if (recording->size() == 0) continue;
+
     const double start = recording->info(0).stamp;
     latest_start = std::max(latest_start, start);
     earliest_start = std::min(earliest_start, start);
     earliest_end = std::min(earliest_end, recording->info(recording->size() - 1).stamp);
   }
   if (live()) return;
+
   const bool together = latest_start <= earliest_end;
   for (const RobotInfo& robot : robots_) {
     const dataset::FrameSource& recording = *recordings_[static_cast<std::size_t>(robot.number)];
@@ -46,6 +51,7 @@ RobotRecordings::RobotRecordings(std::vector<std::unique_ptr<dataset::FrameSourc
       order_.push_back({recording.info(i).stamp - begin, robot.number, i});
     }
   }
+
   std::sort(order_.begin(), order_.end(), [](const Place& a, const Place& b) {
     return std::tie(a.time, a.robot, a.index) < std::tie(b.time, b.robot, b.index);
   });

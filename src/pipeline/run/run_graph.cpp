@@ -97,12 +97,14 @@ class Runner {
       auto started = guarded(node.name, [&] { return node.stage->start(context_); });
       if (!started) return tl::unexpected(started.error());
     }
+
     live_ = context_.input.recordings != nullptr && context_.input.recordings->live();
     total_ = live_ ? std::numeric_limits<std::size_t>::max() : graph_.source().stage->frames();
     for (const Node& node : graph_.nodes) report_.stages.push_back({node.name, {}, 0.0});
     skip_done();
     const auto start = Clock::now();
     pace_.emplace(pace_hz_, started_, context_.input.recordings);
+
     // A pipeline ends when the next frame is not due yet, and another one begins with that: whoever waits for
     // a frame keeps no thread from what else there is to do.
     while (!ended()) {
@@ -110,16 +112,20 @@ class Runner {
       wait_for_live();
       context_.executor->run([this] { stream(); });
     }
+
     report_.behind_s = pace_->behind_s();
     if (failure_.any()) return tl::unexpected(failure_.error());
     if (given_up()) return core::input_error("the run was given up; nothing is written");
+
     if (live_) total_ = std::max(started_, std::min(total_, context_.input.recordings->size()));
     report_.frames = started_;
     report_.frames_available = total_;
     report_.stopped = report_.frames < total_;
+
     for (StageTiming& stage : report_.stages) stage.frame_ms.resize(report_.frames, kUnknown);
     report_.rss_mb.resize(report_.frames, kUnknown);
     if (auto finished = finish(start); !finished) return tl::unexpected(finished.error());
+
     return std::move(report_);
   }
 
@@ -196,6 +202,7 @@ class Runner {
     const StageType& type = *node.type;
     StageIo io(tick.frame, type.inputs, type.outputs);
     tick.outputs[n].resize(type.outputs.size());
+
     bool takes_frames = type.is_source();
     for (std::size_t i = 0; i < type.inputs.size(); ++i) {
       if (type.inputs[i].type.rate != Rate::kFrame || !node.inputs[i]) continue;
@@ -204,6 +211,7 @@ class Runner {
       if (type.inputs[i].required && !io.input_values()[i]) return release(n, tick);
     }
     if (!takes_frames) return;
+
     const auto start = Clock::now();
     auto worked = guarded(node.name, [&] { return node.stage->process(io); });
     tick.ms[n] = static_cast<float>(ms_since(start));
@@ -235,10 +243,12 @@ class Runner {
   core::Result<void> finish(Clock::time_point start) {
     std::vector<std::vector<Value>> results(graph_.nodes.size());
     report_.map_s = ms_since(start) / 1000.0;
+
     for (std::size_t first = 0, count = 0; first < graph_.nodes.size(); first += count) {
       count = 1;
       while (first + count < graph_.nodes.size() && may_export_beside(first, first + count)) ++count;
       report_finishing(first, count);
+
       const auto began = Clock::now();
       std::vector<core::Result<void>> finished(count);
       std::vector<core::Executor::Job> beside;
@@ -246,17 +256,21 @@ class Runner {
         beside.push_back(
             context_.executor->submit([&, k] { finished[k] = finish_stage(first + k, results); }));
       finished[count - 1] = finish_stage(first + count - 1, results);
+
       for (core::Executor::Job& job : beside) job.wait();
       const double seconds = ms_since(began) / 1000.0;
       (graph_.nodes[first].type->exports ? report_.export_s : report_.map_s) += seconds;
+
       for (const auto& one : finished) {
         if (!one) return one;
       }
+
       // Results that no stage will read again are returned to the system at once: the next stage may need the
       // memory.
       for (std::size_t m = 0; m < first + count; ++m) {
         if (last_use_[m] < first + count) results[m].clear();
       }
+
       give_back_memory();
       for (std::size_t n = first; n < first + count; ++n) {
         context_.log->debug(fmt::format("{}: its end took {:.0f} ms; {:.0f} MB are held, {:.0f} MB at most",
@@ -264,6 +278,7 @@ class Runner {
                                         peak_rss_mb()));
       }
     }
+
     return {};
   }
 
@@ -292,6 +307,7 @@ class Runner {
       if (node.type->inputs[i].type.rate != Rate::kEnd || !node.inputs[i]) continue;
       io.input_values()[i] = results[node.inputs[i]->node][node.inputs[i]->port];
     }
+
     const auto start = Clock::now();
     auto finished = guarded(node.name, [&]() -> core::Result<void> {
       for (std::size_t i = 0; i < node.inputs.size(); ++i) {
@@ -302,6 +318,7 @@ class Runner {
       }
       return node.stage->finish(io);
     });
+
     report_.stages[n].finish_ms = ms_since(start);
     results[n] = std::move(io.output_values());
     return finished;

@@ -122,6 +122,7 @@ std::string text_of(const Json& summary) {
   const Json& cloud = summary.at("cloud");
   text += fmt::format("cloud      {} points, {:g} mm voxels\n", count(cloud.at("points")),
                       cloud.at("voxel_m").get<double>() * 1000.0);
+
   for (const std::string& without : {left_out_text(cloud), left_out_of_map_text(cloud)}) {
     if (!without.empty()) text += fmt::format("left out   {}\n", without);
   }
@@ -131,10 +132,12 @@ std::string text_of(const Json& summary) {
   text +=
       fmt::format("time       {:.1f} s in all, {:.1f} s of it export: {:.1f} frames a second without that\n",
                   seconds("wall_s"), seconds("export_s"), seconds("fps"));
+
   if (seconds("pace_hz") > 0.0) {
     text += fmt::format("pace       {:g} frames a second; {:.2f} s behind at most\n", seconds("pace_hz"),
                         seconds("behind_s"));
   }
+
   text += fmt::format("memory     {:.0f} MB at most\n", summary.at("memory").at("peak_rss_mb").get<double>());
   return text;
 }
@@ -186,6 +189,7 @@ core::Result<void> write_timing(const std::filesystem::path& file, const Graph& 
     text += known ? fmt::format(",{:.1f}", report.rss_mb[f]) : ",";
     text += '\n';
   }
+
   return core::write_file(file, text);
 }
 

@@ -13,6 +13,7 @@ void register_stages(StageRegistry& registry) {
   registry.add(fuse_stage());
   registry.add(filter_stage());
   registry.add(store_stage());
+
   registry.add(maps_stage());
   registry.add(merge_stage());
   registry.add(output_stage());

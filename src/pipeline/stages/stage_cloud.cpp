@@ -90,34 +90,41 @@ class CloudStage : public Stage {
     const auto track = io.input<TrackedFrame>("track");
     const std::int32_t robot = recordings_->robot_of(io.frame());
     const std::size_t number = recordings_->frame_of(io.frame());
+
     // The last frame may show surface that no other frame does, if the camera was still moving.
     const bool gives_cloud =
         track->keyframe.valid() ||
         (intermediate_every_ > 0 && (number % static_cast<std::size_t>(intermediate_every_) == 0 ||
                                      recordings_->is_last(io.frame(), stop_)));
+
     const bool gives_view =
         free_space_every_ > 0 && number % static_cast<std::size_t>(free_space_every_) == 0;
     if (!gives_cloud && !gives_view) return {};
+
     const auto frame = io.input<sensor::RgbdFrame>("frame");
     const sensor::Pinhole& camera = recordings_->robot(robot).camera.color;
     core::Result<cloud::CloudPtr> made =
         gives_cloud ? filtered(*frame, camera, track->keyframe)
                     : cloud::depth_view(*frame, camera, options_.min_depth_m, options_.max_depth_m);
     if (!made) return tl::unexpected(made.error());
+
     cloud::set_sensor_pose(**made, track->depth_from_camera.inverse());
     if (observer_ != nullptr && track->keyframe.valid() && track->map_from_camera) {
       observer_->added(robot, track->stamp, *track->map_from_camera * track->depth_from_camera.inverse(),
                        **made);
     }
+
     auto result = std::make_shared<KeyframeCloud>();
     result->id = track->keyframe;
     result->frame = track->frame;
     result->stamp = track->stamp;
     result->compact = std::make_shared<std::vector<std::uint8_t>>(cloud::encode_cloud(**made));
+
     if (result->id.valid()) {
       result->surface = std::make_shared<maps::StoredSurface>(
           maps::StoredSurface{kSurfaceVoxel_m, mapping::coarse_surface(**made, kSurfaceVoxel_m)});
     }
+
     result->cloud = std::move(*made);
     io.output<KeyframeCloud>("cloud", result);
     return {};

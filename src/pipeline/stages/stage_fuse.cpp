@@ -119,6 +119,7 @@ class FuseStage : public Stage {
     dense->upright = report.frame.up != "none";
     dense->state = state_;
     if (dense->upright) cloud::transform(*fused->cloud, report.frame.output_from_map);
+
     if (keyframe_clouds_ && map.name.empty()) {
       const auto written = maps::write_keyframe_clouds(context_->output_folder / "keyframes", *views,
                                                        report.frame.output_from_map,
@@ -129,14 +130,17 @@ class FuseStage : public Stage {
     auto filtered =
         filters_.chain().apply(std::move(*fused), dense->voxel_m, *context_->executor, &report.filters);
     if (!filtered) return tl::unexpected(filtered.error());
+
     if (!report.filters.empty())
       context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(report.filters));
     dense->cloud = std::move(filtered->cloud);
     dense->columns = std::move(filtered->columns);
     report.points = dense->cloud->size();
+
     for (const auto& column : dense->columns.others) {
       if (column.name == cloud::kSigmaColumn) report.sigma = sigma_of(column.values);
     }
+
     return dense;
   }
 
@@ -144,17 +148,21 @@ class FuseStage : public Stage {
     cloud::FusionViews views;
     views.world_from_camera = stored.world_from_camera;
     views.cameras = cameras_of(stored);
+
     if (map.robots.size() > 1) {
       constexpr std::int32_t kMostRobots = 254;
       for (const std::int32_t robot : stored.robots)
         views.robots.push_back(static_cast<std::uint8_t>(std::clamp(robot, 0, kMostRobots)));
     }
+
     for (std::size_t i = 0; i < map.accuracy.size(); ++i) {
       const maps::KeyframePose& keyframe = map.keyframes[i];
       state_->covariances[{keyframe.id.robot, keyframe.stamp}] = map.accuracy[i].covariance;
     }
+
     views.covariances = state_->covariances_of(stored.robots, stored.stamps);
     views.read = [&](std::size_t i) { return read(stored, i); };
+
     cloud::FusionReport report;
     auto fused = cloud::fuse_views(views, options_, *context_->executor, &report);
     context_->log->debug(fmt::format(

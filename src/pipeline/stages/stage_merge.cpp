@@ -122,6 +122,7 @@ class MergeStage : public Stage {
     if (live_) {
       if (auto finished = live_->finish(pictures_); !finished) return finished;
     }
+
     if (maps->maps.size() == 1 && maps->maps.front().robots.size() == 1 &&
         context_->input.stored_maps == nullptr) {
       merged_.map = std::make_shared<MapResult>();
@@ -132,6 +133,7 @@ class MergeStage : public Stage {
     } else {
       merge(maps->maps);
     }
+
     note_components(maps->maps);
     merged_.map->frame_columns = maps->frame_columns;
     merged_.map->frames = maps->frames;
@@ -153,7 +155,8 @@ class MergeStage : public Stage {
   void doubt(const Json& summary, std::vector<Doubt>& reasons) const override {
     if (context_->input.stored_maps != nullptr) doubt_lost_frames(summary, reasons);
     doubt_components_apart(summary, reasons);
-    if (!merged_.unconnected.empty()) reasons.push_back({Doubt::About::kUnconnectedMaps, merged_.unconnected});
+    if (!merged_.unconnected.empty())
+      reasons.push_back({Doubt::About::kUnconnectedMaps, merged_.unconnected});
   }
 
  private:
@@ -174,9 +177,11 @@ class MergeStage : public Stage {
       component.keyframes = part.map->keyframe_count();
       component.frames = static_cast<std::size_t>(std::count_if(
           part.frame_poses.begin(), part.frame_poses.end(), [](const auto& frame) { return frame.tracked; }));
+
       const auto& apart = merged_.map->apart;
       component.joined = std::none_of(apart.begin(), apart.end(),
                                       [&](const auto& other) { return other->name == part.name; });
+
       for (const RobotMerge& merge : merged_.merges) {
         if (merge.a != part.name && merge.b != part.name) continue;
         component.agreeing = std::max(component.agreeing, merge.evidence.consistency.agreeing);
@@ -185,6 +190,7 @@ class MergeStage : public Stage {
           component.why_not +=
               (component.why_not.empty() ? "" : "; ") + other + ": " + merge.evidence.refused;
       }
+
       components_.push_back(std::move(component));
     }
   }

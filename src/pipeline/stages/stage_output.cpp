@@ -85,10 +85,12 @@ class OutputStage : public Stage {
     const auto given = io.input<MapResult>("map");
     if (given->map != nullptr) path_ = maps::check_path(given->frame_poses, *given->map);
     if (context_->hooks.observer != nullptr) tell_observer(*given, *dense);
+
     const MapResult map = moved(*given, dense->output_from_map);
     const std::filesystem::path& folder = context_->output_folder;
     const cloud::CloudColumns& columns = dense->columns;
     const core::Result<void> nothing;
+
     const std::vector<std::function<core::Result<void>()>> steps{
         [&] { return ply_ ? cloud::write_ply(folder / "map.ply", *dense->cloud, columns) : nothing; },
         [&] { return pcd_ ? cloud::write_pcd(folder / "map.pcd", *dense->cloud, columns) : nothing; },
@@ -99,15 +101,18 @@ class OutputStage : public Stage {
         [&] { return map.frames.empty() ? nothing : write_frames(folder / "frames.csv", map, io.frame()); },
         [&] { return write_components(*given, *dense); },
     };
+
     std::vector<core::Result<void>> written(steps.size());
     std::vector<core::Executor::Job> jobs;
     for (std::size_t i = 0; i < steps.size(); ++i)
       jobs.push_back(context_->executor->submit([&, i] { written[i] = steps[i](); }));
     auto drawn = write_snapshots(folder / "snapshots", map, *dense);
+
     for (core::Executor::Job& job : jobs) job.wait();
     for (const auto& one : written) {
       if (!one) return one;
     }
+
     return drawn;
   }
 
@@ -164,18 +169,22 @@ class OutputStage : public Stage {
       const MapResult map = moved(*given.apart[i], own.output_from_map);
       const std::filesystem::path folder = context_->output_folder / "components" / map.name;
       if (auto made = core::make_folder(folder); !made) return made;
+
       if (ply_) {
         if (auto written = cloud::write_ply(folder / "map.ply", *own.cloud, own.columns); !written)
           return written;
       }
+
       if (lines_) {
         if (auto written = maps::write_lines_ply(folder / "lines.ply", map.lines); !written) return written;
       }
       if (auto written = dataset::write_trajectory(folder / "trajectory.txt", map.trajectory); !written)
         return written;
+
       auto written = dataset::write_trajectory(folder / "keyframes.txt", maps::trajectory(map.keyframes));
       if (!written) return written;
     }
+
     return {};
   }
 
@@ -256,24 +265,29 @@ class OutputStage : public Stage {
                                      const DenseCloud& dense) const {
     if (chosen_.empty()) return {};
     if (auto made = core::make_folder(folder); !made) return made;
+
     viz::Scene scene;
     scene.cloud = dense.cloud;
     scene.title = context_->input.source != nullptr ? context_->input.source->name() : "fused maps";
+
     if (map.robots.size() < 2) {
       viz::CameraPath path;
       path.trajectory = map.trajectory;
       scene.paths.push_back(std::move(path));
     }
+
     add_robots(map, dense, scene);
     std::vector<viz::Snapshot> snapshots;
     const auto add = [&](const std::string& name, viz::View view, viz::ColorMode color) {
       snapshots.push_back({picture_options(view, color, dense), folder / (name + ".png")});
     };
+
     for (const viz::View view : chosen_) {
       if (map.robots.size() > 1 && !dense.columns.robot.empty())
         add("robots_" + viz::view_name(view), view, viz::ColorMode::kRobot);
       add(viz::view_name(view), view, viz::ColorMode::kRgb);
     }
+
     return viz::render_snapshots(scene, snapshots, *context_->executor);
   }
 

@@ -54,6 +54,7 @@ class PosesStage : public Stage {
       map_.frames.push_back({io.frame(), "lost", stamp + ","});
       return {};
     }
+
     auto tracked = std::make_shared<TrackedFrame>();
     tracked->robot = robot.number;
     tracked->stamp = frame->stamp;
@@ -61,11 +62,13 @@ class PosesStage : public Stage {
     tracked->frame = {robot.number, way.frames++};
     map_.trajectory.push_back({frame->stamp, *pose});
     map_.trajectory_ids.push_back(tracked->frame);
+
     if (way.keyframes == 0 || is_new_view(way.last, *pose)) {
       tracked->keyframe = {robot.number, way.keyframes++};
       way.last = *pose;
       map_.keyframes.push_back({tracked->keyframe, frame->stamp, *pose});
     }
+
     map_.frames.push_back({io.frame(), "tracked", stamp + (tracked->keyframe.valid() ? ",1" : ",0")});
     io.output<TrackedFrame>("track", tracked);
     return {};

@@ -67,6 +67,7 @@ class RefineStage : public Stage {
     }
 
     add(summary["path"]["refused_adjustments"], summary_.refused);
+
     summary["refine"] = {{"local_maps", summary_.local_maps},
                          {"tried", summary_.tried},
                          {"accepted", summary_.accepted},

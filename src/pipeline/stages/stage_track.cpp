@@ -81,9 +81,11 @@ class TrackStage : public Stage {
     tracked->depth_from_camera = report.depth_from_camera;
     tracked->row = rows_.back();
     if (slam.frame_poses().size() > poses) tracked->pose = slam.frame_poses().back();
+
     if (tracked->pose && tracked->pose->tracked) {
       tracked->frame = {robot.number, static_cast<std::int32_t>(poses)};
     }
+
     if (report.keyframe.valid()) add_map(slam, number, *tracked);
     if (context_->hooks.observer != nullptr)
       observed_[number].report(io.frame(), slam, report, *tracked, *context_->hooks.observer);
@@ -130,6 +132,7 @@ class TrackStage : public Stage {
     Json& components = summary["components"];
     components["dropped"] = dropped_;
     components["dropped_frames"] = dropped_frames_;
+
     for (const RobotInfo& robot : recordings().robots()) {
       const mapping::Slam& slam = *slams_[static_cast<std::size_t>(robot.number)];
       report_loops(slam, summary["loops"]);

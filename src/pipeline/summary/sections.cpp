@@ -151,8 +151,8 @@ void doubt_empty_cloud(const Json& summary, std::vector<Doubt>& reasons) {
   const std::string of_map = left_out_of_map_text(cloud);
   const std::string without = of_map.empty() ? left_out_text(cloud) : of_map;
   reasons.push_back({Doubt::About::kEmptyCloud,
-                    "the cloud is empty: " +
-                        (without.empty() ? "no keyframe had usable depth" : "left out were " + without)});
+                     "the cloud is empty: " +
+                         (without.empty() ? "no keyframe had usable depth" : "left out were " + without)});
 }
 
 }  // namespace plumbline::pipeline

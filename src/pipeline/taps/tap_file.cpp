@@ -26,19 +26,23 @@ void Tap::check(const CheckContext& /*context*/, const core::ConfigMark& mark, c
   const auto refuse = [&](std::string what) { problems.push_back({mark, path + ".file", std::move(what)}); };
   const std::string example = (count_ != Count::kOne ? "tap/*" : "tap") + endings_[0];
   if (file_.empty()) return refuse(fmt::format("a tap needs a file, e.g. file: {}", example));
+
   const fs::path normal = fs::path(file_).lexically_normal();
   const bool outside = normal.is_absolute() || (!normal.empty() && *normal.begin() == "..");
   if (outside || !normal.has_filename()) {
     return refuse(fmt::format("{} is not a file below the result folder, such as {}", file_, example));
   }
+
   if (std::any_of(file_.begin(), file_.end(), [](unsigned char c) { return c < 0x20; })) {
     return refuse("the file's name contains control characters");
   }
+
   if (std::find(endings_.begin(), endings_.end(), ending()) == endings_.end()) {
     refuse(fmt::format("{}: a {} is not written here (allowed: {})", file_,
                        ending().empty() ? "file without ending" : ending() + " file",
                        fmt::join(endings_, ", ")));
   }
+
   const auto stars = std::count(file_.begin(), file_.end(), '*');
   if (count_ == Count::kOne && stars != 0) refuse(file_ + ": one file is written here; leave out the *");
   if (count_ != Count::kOne && (stars != 1 || normal.filename().string().find('*') == std::string::npos)) {

@@ -42,8 +42,10 @@ std::string plain_yaml(std::string text) {
   if (const std::size_t at = text.find("%YAML"); at != std::string::npos && at <= 3) {
     text.replace(at, std::min(text.find('\n', at), text.size()) - at, "");
   }
+
   replace_all(text, "!!opencv-matrix", std::string(15, ' '));
   bool content = false;
+
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());
     const std::string line = text.substr(begin, std::min<std::size_t>(end - begin, 3));
@@ -54,8 +56,10 @@ std::string plain_yaml(std::string text) {
     } else if (line.find_first_not_of(" \t\r") != std::string::npos && line[0] != '#') {
       content = true;
     }
+
     begin = end + 1;
   }
+
   return text;
 }
 
@@ -198,11 +202,13 @@ std::string camera_lines(const Camera& camera) {
   const auto known = [](double value, const char* otherwise) {
     return value != 0.0 && std::isfinite(value) ? fmt::format("{}", value) : std::string(otherwise);
   };
+
   const Distortion& k = camera.distortion;
   const bool fisheye = camera.model == LensModel::kEquidistant;
   const bool rational = !fisheye && (k[5] != 0.0 || k[6] != 0.0 || k[7] != 0.0);
   const std::ptrdiff_t count = fisheye ? 4 : rational ? 8 : 5;
   const std::vector<double> coefficients(k.begin(), k.begin() + count);
+
   return fmt::format(
       "{}  width: {}\n  height: {}\n  fx: {}\n  fy: {}\n  cx: {}\n  cy: {}\n  distortion: [{}]  # {}\n"
       "  depth_scale: {}  # raw units per metre",

@@ -100,21 +100,25 @@ std::string take_matrix(const std::vector<double>& numbers, Camera& camera) {
   if (numbers.size() != 9 && numbers.size() != 12 && numbers.size() != 16) {
     return fmt::format("the matrix has {} numbers (allowed: 3x3, 3x4 or 4x4)", numbers.size());
   }
+
   const auto at = [&](std::size_t row, std::size_t column) { return numbers[row * columns + column]; };
   const bool square = numbers.size() != 12;
   const bool by_columns =
       square && at(0, 2) == 0.0 && at(1, 2) == 0.0 && (at(2, 0) != 0.0 || at(2, 1) != 0.0);
   const double skew = by_columns ? at(1, 0) : at(0, 1);
   const double other = by_columns ? at(0, 1) : at(1, 0);
+
   camera.color.fx = at(0, 0);
   camera.color.fy = at(1, 1);
   camera.color.cx = by_columns ? at(2, 0) : at(0, 2);
   camera.color.cy = by_columns ? at(2, 1) : at(1, 2);
   if (at(2, 2) != 1.0 || other != 0.0)
     return "the matrix is not that of a camera (expected: fx 0 cx, 0 fy cy, 0 0 1)";
+
   if (std::abs(skew) > 1e-6 * std::abs(at(0, 0))) {
     return fmt::format("the matrix has a skew of {}, which no camera here has", skew);
   }
+
   return "";
 }
 
@@ -129,8 +133,10 @@ std::string take_coefficients(const std::string& model, const std::vector<double
         "fisheye lenses are); undistort the images first",
         model);
   }
+
   const bool fisheye = names({"equidistant", "fisheye", "kannala", "kb4"});
   const std::size_t known = fisheye ? 4 : lens.k.size();
+
   const bool more =
       numbers.size() > known && std::any_of(numbers.begin() + static_cast<std::ptrdiff_t>(known),
                                             numbers.end(), [](double k) { return k != 0.0; });
@@ -141,6 +147,7 @@ std::string take_coefficients(const std::string& model, const std::vector<double
         model.empty() ? "" : " '" + model + "'", numbers.size(),
         fisheye ? "k1 k2 k3 k4" : "k1 k2 p1 p2 k3 k4 k5 k6");
   }
+
   lens.model = fisheye ? LensModel::kEquidistant : LensModel::kRadialTangential;
   std::copy_n(numbers.begin(), std::min(known, numbers.size()), lens.k.begin());
   return "";

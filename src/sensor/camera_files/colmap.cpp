@@ -84,18 +84,21 @@ core::Result<CameraReading> read_colmap(const CameraText& text) {
     const auto refuse = [&](const std::string& what) {
       return refuse_camera(text, kColmapCamera, {text.file, line.number, 1}, what, reading.camera);
     };
+
     const ColmapModel* model = colmap_model(line);
     if (model == nullptr) return refuse("expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS");
     if (&line != &lines.front()) {
       if (std::equal(first.begin(), first.end(), line.words.begin() + 1, line.words.end())) continue;
       return refuse("holds several cameras that differ; leave the one of the colour images");
     }
+
     const auto numbers = colmap_numbers(line);
     if (!numbers || numbers->size() != model->parameters + 2)
       return refuse(fmt::format("{} needs a width, a height and {} numbers", model->name, model->parameters));
     if (const std::string wrong = take_colmap(*model, *numbers, reading.camera); !wrong.empty())
       return refuse(wrong);
   }
+
   reading.has_size = true;
   reading.notes.emplace_back("half a pixel subtracted from the principal point");
   return reading;

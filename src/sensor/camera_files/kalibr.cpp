@@ -33,13 +33,16 @@ core::Result<CameraReading> read_kalibr(const CameraText& text) {
     return refuse(node, fmt::format("the model '{}' is not supported, only 'pinhole' is (with the distortion "
                                     "'radtan' or 'equidistant')",
                                     model));
+
   const core::ConfigNode& intrinsics = *find_any(node, {"intrinsics"});
   const auto k = numbers_in(intrinsics);
   if (!k || k->size() != 4) return refuse(intrinsics, "intrinsics are not the four numbers [fx, fy, cx, cy]");
+
   camera.color.fx = (*k)[0];
   camera.color.fy = (*k)[1];
   camera.color.cx = (*k)[2];
   camera.color.cy = (*k)[3];
+
   if (const core::ConfigNode* size = find_any(node, {"resolution"})) {
     const auto pixels = numbers_in(*size);
     if (!pixels || pixels->size() != 2) return refuse(*size, "resolution is not [width, height]");
@@ -47,11 +50,14 @@ core::Result<CameraReading> read_kalibr(const CameraText& text) {
     camera.color.height = static_cast<int>((*pixels)[1]);
     reading.has_size = true;
   }
+
   if (const auto rate = number_at(node, {"rate_hz"}); rate && *rate > 0.0) camera.fps = *rate;
   const core::ConfigNode* coefficients = find_any(node, {"distortion_coeffs", "distortion_coefficients"});
   if (coefficients == nullptr) return reading;
+
   const auto d = numbers_in(*coefficients);
   if (!d) return refuse(*coefficients, "the distortion coefficients are not numbers");
+
   const std::string wrong = take_coefficients(word_at(node, {"distortion_model"}), *d, camera);
   if (!wrong.empty()) return refuse(*coefficients, wrong);
   return reading;

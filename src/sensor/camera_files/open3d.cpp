@@ -27,10 +27,12 @@ core::Result<CameraReading> read_open3d(const CameraText& text) {
   const auto width = number_at(node, {"width"});
   const auto height = number_at(node, {"height"});
   reading.has_size = width && height;
+
   if (reading.has_size) {
     camera.color.width = static_cast<int>(*width);
     camera.color.height = static_cast<int>(*height);
   }
+
   const auto scale = number_at(text.tree, {"depth_scale"});
   camera.depth_scale = scale && *scale > 0.0 ? units_per_metre(*scale) : millimetres;
   reading.has_depth_scale = scale.has_value();

@@ -42,6 +42,7 @@ core::Result<CameraReading> read_orb_slam(const CameraText& text) {
     if (!number) missing += fmt::format(" {}{}", prefix == "camera." ? "Camera." : "Camera1.", name);
     value = number.value_or(0.0);
   };
+
   need("fx", camera.color.fx);
   need("fy", camera.color.fy);
   need("cx", camera.color.cx);
@@ -49,19 +50,23 @@ core::Result<CameraReading> read_orb_slam(const CameraText& text) {
   const auto width = number_at(text.tree, {"camera.width"});
   const auto height = number_at(text.tree, {"camera.height"});
   reading.has_size = width && height;
+
   if (reading.has_size) {
     camera.color.width = static_cast<int>(*width);
     camera.color.height = static_cast<int>(*height);
   }
+
   if (const auto fps = number_at(text.tree, {"camera.fps"}); fps && *fps > 0.0) camera.fps = *fps;
   if (const auto factor = number_at(text.tree, {"depthmapfactor", "rgbd.depthmapfactor"})) {
     camera.depth_scale = *factor == 0.0 ? 1.0 : *factor;  // as ORB-SLAM takes it
     reading.has_depth_scale = true;
   }
   if (!missing.empty()) return refuse_camera(text, kOrbSlamCamera, {}, "no number for" + missing, camera);
+
   const std::string model = word_at(text.tree, {"camera.type"});
   if (const std::string wrong = take_orb_distortion(text, prefix, model, camera); !wrong.empty())
     return refuse_camera(text, kOrbSlamCamera, {}, wrong, camera);
+
   return reading;
 }
 

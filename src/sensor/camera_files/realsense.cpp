@@ -101,23 +101,29 @@ core::Result<CameraReading> read_realsense(const CameraText& text) {
   const auto refuse = [&](const core::ConfigNode& at, const std::string& what) {
     return refuse_camera(text, kRealSenseCamera, at.mark, what, camera);
   };
+
   Lens lens;
   if (const std::string wrong = take_stream(node, lens, camera.color); !wrong.empty())
     return refuse(node, wrong);
+
   camera.model = lens.model;
   camera.distortion = lens.k;
   reading.has_size = camera.color.width > 0 && camera.color.height > 0;
+
   if (camera.distorted() && has_word(word_at(node, {"model"}), "inverse"))
     reading.notes.emplace_back(
         "coefficients of inverse_brown_conrady taken as OpenCV's, as RealSense's ROS driver does");
+
   if (found.depth_scale && *found.depth_scale > 0.0) {
     camera.depth_scale = units_per_metre(*found.depth_scale);
     reading.has_depth_scale = true;
   }
+
   if (const auto fps = number_at(node, {"fps"}); fps && *fps > 0.0) camera.fps = *fps;
   if (found.color == nullptr || found.depth == nullptr) return reading;
   if (const std::string wrong = take_depth_stream(found, reading); !wrong.empty())
     return refuse(*found.depth, wrong);
+
   return reading;
 }
 

@@ -23,18 +23,22 @@ core::Result<CameraReading> read_replica(const CameraText& text) {
   const core::ConfigNode& node = *replica_camera(text);
   const std::string missing = take_pinhole(node, camera.color);
   if (!missing.empty()) return refuse_camera(text, kReplicaCamera, node.mark, missing, camera);
+
   reading.has_size = true;
   if (const auto scale = number_at(node, {"scale", "png_depth_scale", "depth_scale"})) {
     camera.depth_scale = units_per_metre(*scale);
     reading.has_depth_scale = true;
   }
+
   if (const auto fps = number_at(node, {"fps"}); fps && *fps > 0.0) camera.fps = *fps;
   const core::ConfigNode* coefficients = find_any(node, {"distortion"});
   if (coefficients == nullptr) return reading;
+
   const auto d = numbers_in(*coefficients);
   const std::string wrong =
       d ? take_coefficients("", *d, camera) : "the distortion coefficients are not numbers";
   if (!wrong.empty()) return refuse_camera(text, kReplicaCamera, coefficients->mark, wrong, camera);
+
   return reading;
 }
 

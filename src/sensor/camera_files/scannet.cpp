@@ -41,8 +41,10 @@ std::string take_scannet(const ScanNetKeys& keys, const std::string& which, Came
     const auto found = keys.find(key);
     return found == keys.end() || found->second.size() != 1 ? NAN : found->second[0];
   };
+
   const std::string capital = which == "color" ? "Color" : "Depth";
   const bool sens = keys.count("m_calibrationColorIntrinsic") > 0;
+
   if (sens) {
     const auto matrix = keys.find("m_calibration" + capital + "Intrinsic");
     if (matrix == keys.end()) return fmt::format("no m_calibration{}Intrinsic", capital);
@@ -53,10 +55,12 @@ std::string take_scannet(const ScanNetKeys& keys, const std::string& which, Came
     camera.color.cx = value("mx_" + which);
     camera.color.cy = value("my_" + which);
   }
+
   const double width = value(sens ? "m_" + which + "Width" : which + "Width");
   const double height = value(sens ? "m_" + which + "Height" : which + "Height");
   if (!(width >= 1.0) || !(height >= 1.0) || width > 1e6 || height > 1e6)
     return fmt::format("the size of the {} image is missing", which);
+
   camera.color.width = static_cast<int>(width);
   camera.color.height = static_cast<int>(height);
   const bool all = std::isfinite(camera.color.fx + camera.color.fy + camera.color.cx + camera.color.cy);

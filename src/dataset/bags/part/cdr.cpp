@@ -309,6 +309,7 @@ Bytes encode_cdr(const CloudMessage& message) {
   cloud.header = header_from(message.header.stamp_ns, message.header.frame_id);
   cloud.height = 1;
   cloud.width = message.points;
+
   cloud.fields._length = cloud.fields._maximum = static_cast<std::uint32_t>(fields.size());
   cloud.fields._buffer = fields.data();
   cloud.point_step = kPointBytes;

@@ -193,10 +193,12 @@ core::Result<TemporaryFile> TemporaryFile::inflated(const std::filesystem::path&
   std::string name = (std::filesystem::temp_directory_path(ignored) / "plumbline_XXXXXX").string();
   TemporaryFile target;
   target.descriptor_ = mkostemp(name.data(), O_CLOEXEC);
+
   if (target.descriptor_ < 0) {
     return core::output_error(fmt::format("{}: no temporary file for what is compressed in it: {}",
                                           file.string(), std::strerror(errno)));
   }
+
   target.path_ = name;
 
   std::ifstream stream(file, std::ios::binary);
@@ -205,6 +207,7 @@ core::Result<TemporaryFile> TemporaryFile::inflated(const std::filesystem::path&
   const std::unique_ptr<ZSTD_DCtx, std::size_t (*)(ZSTD_DCtx*)> context(ZSTD_createDCtx(), &ZSTD_freeDCtx);
   std::size_t left = 1;
   cut = false;
+
   while (!cut &&
          (stream.read(packed.data(), static_cast<std::streamsize>(packed.size())), stream.gcount() > 0)) {
     ZSTD_inBuffer input{packed.data(), static_cast<std::size_t>(stream.gcount()), 0};
@@ -214,6 +217,7 @@ core::Result<TemporaryFile> TemporaryFile::inflated(const std::filesystem::path&
       left = ZSTD_decompressStream(context.get(), &output, &input);
       cut = ZSTD_isError(left) != 0;
       full = output.pos == output.size;
+
       if (!write_all(target.descriptor_, plain.data(), output.pos)) {
         return core::output_error(
             fmt::format("{}: what is compressed in it does not fit into the folder of temporary files: {}; "
@@ -222,6 +226,7 @@ core::Result<TemporaryFile> TemporaryFile::inflated(const std::filesystem::path&
       }
     }
   }
+
   cut = cut || left != 0;
   return target;
 }

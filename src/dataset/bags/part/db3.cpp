@@ -96,6 +96,7 @@ core::Result<void> Db3File::prepare() {
           {text_in(topics.get(), 1), plain_type(text_in(topics.get(), 2)), text_in(topics.get(), 3)});
     }
   }
+
   read_ = statement("SELECT data FROM messages WHERE id = ?");
   if (topics != nullptr && read_ != nullptr) return {};
   return core::input_error(fmt::format("{}: is not a rosbag2 bag, or is damaged at its beginning: {}", shown_,
@@ -124,6 +125,7 @@ core::Result<void> Db3File::scan(const Visit& visit) {
   const Statement rows = statement("SELECT id, topic_id, timestamp, length(data) FROM messages ORDER BY id");
   std::unique_ptr<sqlite3_blob, CloseBlob> blob;
   std::size_t seen = 0;
+
   int step = SQLITE_ERROR;
   while (rows != nullptr && (step = sqlite3_step(rows.get())) == SQLITE_ROW) {
     const std::int64_t row = sqlite3_column_int64(rows.get(), 0);
@@ -131,17 +133,20 @@ core::Result<void> Db3File::scan(const Visit& visit) {
     const std::int64_t size = sqlite3_column_int64(rows.get(), 3);
     if (topic == topic_of_id_.end() || size < 0 || size > static_cast<std::int64_t>(kMostMessageBytes))
       continue;
+
     BagEntry entry;
     entry.topic = topic->second;
     entry.log_ns = sqlite3_column_int64(rows.get(), 2);
     entry.place.at = static_cast<std::uint64_t>(row);
     entry.place.size = static_cast<std::uint32_t>(size);
+
     const Bytes head = head_of(blob, row, entry.place.size);
     entry.head = head.data();
     entry.head_size = head.size();
     ++seen;
     visit(entry);
   }
+
   if (step == SQLITE_DONE) return {};
   notes_.push_back(fmt::format("{}: is cut off or damaged after {} messages ({}); what is before is used",
                                shown_, seen, sqlite3_errmsg(database_.get())));

@@ -64,13 +64,16 @@ core::Result<void> McapFile::scan(const Visit& visit) {
   while (!ended) {
     std::array<std::uint8_t, kRecordHead> head{};
     if (!file_.read(at, head.data(), head.size())) break;
+
     const auto opcode = static_cast<McapOpcode>(head[0]);
     const auto size = McapFields(head.data() + 1, head.size() - 1).number<std::uint64_t>();
     at += kRecordHead;
+
     if (head[0] == 0 || size > file_.size() - at) {
       at -= kRecordHead;
       break;
     }
+
     ended = opcode == McapOpcode::kDataEnd || opcode == McapOpcode::kFooter;
     if (!ended) scan_record(opcode, at, size, visit);
     at += size;
@@ -80,11 +83,13 @@ core::Result<void> McapFile::scan(const Visit& visit) {
     notes_.push_back(fmt::format("{}: is cut off or damaged at byte {} of {}; what is before is used", shown_,
                                  at, file_.size()));
   }
+
   if (damaged_chunks_ > 0) {
     notes_.push_back(
         fmt::format("{}: {} chunks are damaged and their messages lost; the first, at byte {}, {}", shown_,
                     damaged_chunks_, first_damaged_, why_damaged_));
   }
+
   return {};
 }
 
@@ -93,6 +98,7 @@ void McapFile::scan_record(McapOpcode opcode, std::uint64_t at, std::uint64_t si
     scan_chunk(at, size, visit);
   } else if (opcode == McapOpcode::kMessage) {
     if (size < kMessageHead || size - kMessageHead > kMostMessageBytes) return;
+
     std::uint64_t next = at;
     const auto get = [&](std::uint8_t* to, std::size_t count) {
       const bool there = file_.read(next, to, count);
@@ -181,6 +187,7 @@ bool McapFile::scan_message(const Get& get, MessagePlace place, const Visit& vis
     entry.head = unpacked.data();
     entry.head_size = unpacked.size();
   }
+
   visit(entry);
   return true;
 }
@@ -244,17 +251,21 @@ core::Result<Bytes> McapFile::read(const MessagePlace& place) const {
   } else {
     const auto chunk = chunk_at(place.at);
     if (!chunk) return tl::unexpected(chunk.error());
+
     const Bytes& plain = **chunk;
     if (place.offset > plain.size() || place.size > plain.size() - place.offset) {
       return core::input_error(
           fmt::format("{}: the chunk at byte {} has changed while it was used", shown_, place.at));
     }
+
     const auto begin = plain.begin() + static_cast<std::ptrdiff_t>(place.offset);
     bytes.assign(begin, begin + place.size);
   }
+
   if (!unpack_message(bytes)) {
     return core::input_error(fmt::format("{}: the message at byte {} cannot be unpacked", shown_, place.at));
   }
+
   return bytes;
 }
 

@@ -183,6 +183,7 @@ void McapWriter::flush() {
   chunk.at = at_;
   chunk.packed_size = packed.size();
   chunk.plain_size = records_.size();
+
   put(record(McapOpcode::kChunk, RecordFields()
                                      .number(chunk.first_ns)
                                      .number(chunk.last_ns)
@@ -191,6 +192,7 @@ void McapWriter::flush() {
                                      .text("zstd")
                                      .number(chunk.packed_size)
                                      .bytes(packed)));
+
   chunk.record_size = at_ - chunk.at;
   put_indices(chunk);
   chunks_.push_back(std::move(chunk));
@@ -233,12 +235,14 @@ Bytes McapWriter::statistics() const {
     counts.number(channel).number(count);
     messages += count;
   }
+
   std::int64_t first = chunks_.empty() ? 0 : std::numeric_limits<std::int64_t>::max();
   std::int64_t last = 0;
   for (const WrittenChunk& chunk : chunks_) {
     first = std::min(first, chunk.first_ns);
     last = std::max(last, chunk.last_ns);
   }
+
   return record(McapOpcode::kStatistics, RecordFields()
                                              .number(messages)
                                              .number(static_cast<std::uint16_t>(schemas_.size()))

@@ -138,18 +138,21 @@ core::Result<void> Ros1Bag::scan(const Visit& visit) {
     at += count;
     return true;
   };
+
   std::uint64_t begin = at;
   bool whole = true;
   while (whole && (begin = at) < file_.size()) {
     const auto record = next_record(get);
     whole = record && record->data_size <= file_.size() - at;
     if (!whole) break;
+
     const std::uint64_t data = at;
     if (record->op == kOpBagHeader && !record->fields.text("encryptor").empty())
       return core::input_error(shown_ + ": is encrypted; decrypt it with rosbag first");
     if (record->op == kOpChunk) {
       const Chunk chunk = chunk_of(*record, data);
       const bool good = scan_chunk(chunk, visit);
+
       if (!good && damaged_chunks_++ == 0) {
         notes_.push_back(fmt::format("{}: the chunk at byte {} is damaged ({}); its other messages are lost",
                                      shown_, begin,
@@ -163,14 +166,18 @@ core::Result<void> Ros1Bag::scan(const Visit& visit) {
         next += count;
         return true;
       };
+
       scan_inner(*record, in_file, {data, kOutsideChunks, record->data_size, 0}, visit);
     }
+
     at = data + record->data_size;
   }
+
   if (!whole) {
     notes_.push_back(fmt::format("{}: is cut off or damaged at byte {} of {}; what is before is used", shown_,
                                  begin, file_.size()));
   }
+
   if (damaged_chunks_ > 1)
     notes_.push_back(fmt::format("{}: {} chunks are damaged", shown_, damaged_chunks_));
   return {};
@@ -188,17 +195,21 @@ bool Ros1Bag::scan_inner(const BagRecord& record, const Get& get_data, MessagePl
     add_connection(record.fields, data);
     return true;
   }
+
   if (record.op != kOpMessage) return true;
   if (record.data_size > kMostMessageBytes) return false;
+
   std::array<std::uint8_t, kHeadBytes> head{};
   BagEntry entry;
   entry.place = place;
   entry.head = head.data();
   entry.head_size = std::min<std::size_t>(record.data_size, kHeadBytes);
   if (!get(head.data(), entry.head_size)) return false;
+
   const auto topic = topic_of_connection_.find(record.fields.number<std::uint32_t>("conn"));
   if (topic == topic_of_connection_.end()) return true;
   entry.topic = topic->second;
+
   const auto time = record.fields.number<std::uint64_t>("time");  // seconds, nanoseconds
   entry.log_ns =
       static_cast<std::int64_t>(time & 0xFFFFFFFFU) * 1'000'000'000 + static_cast<std::int64_t>(time >> 32);
