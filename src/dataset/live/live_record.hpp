@@ -21,7 +21,7 @@ class LiveRecord {
     std::string info;        ///< CameraInfo of colour; "": none
     std::string depth_info;  ///< "": none, or the same
   };
-  /// What is said with each frame of the cameras; none: nothing.
+  /// CameraInfo messages that accompany each frame; none: nothing is known.
   struct Infos {
     std::optional<CameraInfoMessage> color;
     std::optional<CameraInfoMessage> depth;

@@ -17,7 +17,7 @@ namespace {
 
 constexpr const char* kScheme = "ros2://";
 
-/// What all views of one live camera share.
+/// State that all views of one live camera share.
 struct LiveCamera {
   std::string name;
   std::string address;
@@ -184,7 +184,7 @@ core::Result<std::unique_ptr<FrameSource>> open_live(const std::string& address,
       std::move(stream), LiveTopic{topics->color.topic->topic, topics->color.topic->decoder},
       LiveTopic{topics->depth.topic->topic, topics->depth.topic->decoder}, how, log);
 
-  // What came meanwhile are the first frames.
+  // Images that came meanwhile are the first frames.
   for (const LiveMessage& message : found->images) live->stream->add(message);
   if (!live->stream->wait_for_first(live_options.patience)) {
     return core::input_error(fmt::format(

@@ -63,7 +63,7 @@ class LiveStream final : public MessageImages {
   /// Takes what comes until there is a first frame, before start(); false: none came in time.
   bool wait_for_first(std::chrono::milliseconds most);
 
-  // What follows is thread-safe.
+  // The functions below are thread-safe.
   [[nodiscard]] std::size_t size() const;
   [[nodiscard]] PairInfo info(std::size_t index) const;
   [[nodiscard]] std::vector<PairInfo> infos() const;

@@ -96,7 +96,7 @@ class StreamSurveyor {
     sort_topics();
     return std::move(found_);
   }
-  /// What came while listening goes on for these only.
+  /// Keeps messages of these topics only.
   void keep_only(const std::set<std::string>& topics) {
     for (const auto& [topic, type] : types_) {
       if (topics.count(topic) == 0) stream_.unsubscribe(topic);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What a stream of messages has to offer: listened to for a moment and looked at as if it were a bag.
+// Contents of a stream of messages: listened to for a moment and treated as if it were a bag.
 #include <memory>
 #include <string>
 #include <vector>
@@ -33,7 +33,7 @@ core::Result<LiveSurvey> survey_stream(const std::string& address, MessageStream
                                        const TopicNames& named, std::chrono::milliseconds patience,
                                        const core::StopToken& stop);
 
-/// What is published, a line each.
+/// The published topics, one line each.
 std::string published_text(const std::vector<StreamTopic>& topics);
 
 }  // namespace plumbline::dataset
