@@ -106,7 +106,7 @@ TEST_F(Exports, WrongListsAreToldBeforeTheRun) {
           " -o out -q --set 'output.exports=[grid.e57, {file: plan.svg, heights: [0 m, 1 m]}, ../up.las]'");
   EXPECT_EQ(wrong.code, 2) << wrong;
   EXPECT_TRUE(wrong.told("grid.e57")) << wrong;
-  EXPECT_TRUE(wrong.told("--heights: means nothing to plan")) << wrong;
+  EXPECT_TRUE(wrong.told("--heights: is not an option of plan")) << wrong;
   EXPECT_TRUE(wrong.told("below the result folder")) << wrong;
   EXPECT_FALSE(fs::exists(path("out")));
 }

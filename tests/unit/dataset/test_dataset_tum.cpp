@@ -181,7 +181,7 @@ TEST_F(Tum, FromToEvery) {
   options.to_s = 60.0;
   EXPECT_THAT(open_error(options), AllOf(HasSubstr("nothing lies between"), HasSubstr("0.90 s long")));
   options.every = 0;
-  EXPECT_THAT(open_error(options), HasSubstr("every 0"));
+  EXPECT_THAT(open_error(options), HasSubstr("every: 0"));
 }
 
 TEST_F(Tum, SummaryTellsWhatIsThere) {

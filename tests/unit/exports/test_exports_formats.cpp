@@ -65,7 +65,7 @@ TEST(ExportFormats, SayWhatIsWrong) {
   EXPECT_NE(wrong(checked("a.e57")).find("allowed:"), std::string::npos);
   EXPECT_NE(wrong(checked("a.txt")).find("--format"), std::string::npos)
       << "a path only when it is asked for";
-  EXPECT_NE(wrong(checked("a.las", Content::kCloud, "", {"cut"})).find("--cut: means nothing to las"),
+  EXPECT_NE(wrong(checked("a.las", Content::kCloud, "", {"cut"})).find("--cut: is not an option of las"),
             std::string::npos);
   EXPECT_NE(wrong(checked("a.glb", Content::kCloud, "", {"reach"})).find("without --mesh"),
             std::string::npos);

@@ -342,8 +342,8 @@ TEST_F(ForeignCamera, WhatIsNotReadIsNamedWithTheLinesToWrite) {
   EXPECT_THAT(refusal("%YAML:1.0\nmodel_type: PINHOLE\nprojection_parameters:\n   fx: 4.6e+02\n"),
               HasSubstr("VINS"));
   EXPECT_THAT(refusal("dear diary\n", "notes.txt"),
-              AllOf(HasSubstr("is not a camera file"), HasSubstr("COLMAP")));
-  EXPECT_THAT(refusal("", "empty.txt"), HasSubstr("is not a camera file"));
+              AllOf(HasSubstr("is not a known camera file"), HasSubstr("COLMAP")));
+  EXPECT_THAT(refusal("", "empty.txt"), HasSubstr("is not a known camera file"));
   EXPECT_THAT(refusal(std::string(2'000'000, '1'), "long.txt"), HasSubstr("1 MB"));
   EXPECT_THAT(refusal("a: [1, 2\n", "broken.yaml"), HasSubstr("broken.yaml:"));
 }
