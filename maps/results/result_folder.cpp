@@ -58,7 +58,7 @@ core::Result<std::vector<LineSegment3>> read_lines_ply(const std::filesystem::pa
   if (x == nullptr || y == nullptr || z == nullptr) {
     return core::input_error(fmt::format("{}: the vertices have no x, y, z", file.string()));
   }
-  const auto vertex = [&](std::uint32_t i) {
+  const auto vertex = [&](std::uint32_t i) -> Eigen::Vector3d {  // an expression would outlive its vector
     return Eigen::Vector3f((*x)[i], (*y)[i], (*z)[i]).cast<double>();
   };
   std::vector<LineSegment3> lines;

@@ -61,9 +61,9 @@ class CloudData {
         y = (y + bytes[6 * n + i]) & 255;
         o = (o + bytes[7 * n + i]) << 24 >> 24;
         g = (g + bytes[8 * n + i]) << 24 >> 24;
-        r = clamp(y - g + o, 0, 255);
-        gr = clamp(y + g, 0, 255);
-        b = clamp(y - g - o, 0, 255);
+        r = clamp(y - 2 * g + 2 * o, 0, 255);
+        gr = clamp(y + 2 * g, 0, 255);
+        b = clamp(y - 2 * g - 2 * o, 0, 255);
       }
       colors[4 * i] = r;
       colors[4 * i + 1] = gr;

@@ -16,8 +16,8 @@ constexpr std::size_t kChunk = 32768;        // points
 constexpr std::size_t kFirstLevel = 120000;  // points, at most: what is seen at once
 constexpr double kStep_m = 0.002;            // of the grid
 constexpr double kMostSteps = 65535.0;
-constexpr int kBits = 16;        // of a coordinate
-constexpr int kCompression = 9;  // of libdeflate's 1 to 12
+constexpr int kBits = 16;         // of a coordinate
+constexpr int kCompression = 12;  // of libdeflate's 1 to 12
 
 using Steps = std::array<std::uint16_t, 3>;
 
@@ -184,8 +184,8 @@ std::string packed_points(const Points& points, const Grid& grid, const std::vec
   for (const std::size_t i : chosen) {
     const auto& [r, g, b] = points.colors[grid.order[i]];
     planes[0].put((r + 2 * g + b + 2) / 4);
-    planes[1].put((r - b) >> 1);
-    planes[2].put((2 * g - r - b) >> 2);
+    planes[1].put((r - b) >> 2);  // eyes need hues less exactly
+    planes[2].put((2 * g - r - b) >> 3);
   }
   return packed(bytes);
 }

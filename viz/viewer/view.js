@@ -42,8 +42,13 @@ class View {
     this.radius = Math.max(1, ...[this.low, this.high].map((p) => length(sub(p, this.middle))));
   }
 
+  /** All of it, from where the cameras looked: what they saw faces them. */
   home() {
     this.camera = new Camera();
+    const { q } = this.scene.paths[0] || { q: [] };
+    let ahead = [0, 0, 0];
+    for (let i = 0; i < q.length; i += 4) ahead = add(ahead, turned(q.slice(i, i + 4), [0, 0, 1]));
+    if (Math.hypot(ahead[0], ahead[1]) > q.length / 40) this.camera.yaw = Math.atan2(ahead[1], ahead[0]);
     this.camera.target = this.middle.slice();
     this.camera.distance = this.size0 * 1.9 / Math.min(1, this.canvas.clientWidth / this.canvas.clientHeight || 1);
     this.changed();
@@ -190,7 +195,7 @@ class View {
     return {
       matrix: this.lens.matrix, eye: this.lens.eye, low: this.cut.low, high: this.cut.high, mode, from,
       per: 1 / Math.max(to - from, 1e-6), cull: this.cull ? (this.lens.flat ? 2 : 1) : 0, size,
-      least: 1, most: 64, round: this.rounds,
+      least: this.ratio * 1.5, most: 64, round: this.rounds,
       tint: both ? (cloud === this.clouds[0] ? [0.7, 0.9, 1.25] : [1.25, 0.85, 0.6]) : [1, 1, 1],
     };
   }
@@ -232,7 +237,7 @@ class View {
         spent += list[at].chunk.count;
       }
       const spacing = cloud.levels[Math.min(level, cloud.levels.length - 1)];
-      this.painter.drawPoints(which, cloud, batch, this.look4(cloud, spacing * 1.5 * this.size * this.focal));
+      this.painter.drawPoints(which, cloud, batch, this.look4(cloud, spacing * 1.8 * this.size * this.focal));
     }
     return { at, spent };
   }

@@ -71,7 +71,7 @@ void read_chunk(const EncodedCloud& cloud, const Chunk& chunk, const Points& poi
   const auto co = summed(bytes, 7 * n, n, true);
   const auto cg = summed(bytes, 8 * n, n, true);
   for (std::size_t i = 0; i < n; ++i)
-    read[i].color = {y[i] - cg[i] + co[i], y[i] + cg[i], y[i] - cg[i] - co[i]};
+    read[i].color = {y[i] - 2 * cg[i] + 2 * co[i], y[i] + 2 * cg[i], y[i] - 2 * cg[i] - 2 * co[i]};
   if (!chunk.normals.empty()) {
     const auto folds = inflated(chunk.normals, 2 * n);
     const auto u = summed(folds, 0, n, false);
@@ -153,7 +153,7 @@ TEST(ViewerEncode, EveryPointComesBackOnceWithWhatItHas) {
     if (found->second.size() > 1) continue;
     const Read& r = *found->second.front();
     EXPECT_LT((r.place - Eigen::Vector3d(x, y, z)).lpNorm<Eigen::Infinity>(), 0.0011);
-    for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(r.color[k], points.colors[i][k], 3) << i;
+    for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(r.color[k], points.colors[i][k], 5) << i;
     const auto& [nx, ny, nz] = points.normals[i];
     EXPECT_GT(unfolded(r.fold).dot(Eigen::Vector3d(nx, ny, nz)), 0.997);
     const float confidence = points.layers[0].values[i];
