@@ -36,7 +36,7 @@ class Report : public ProgramTest {
   }
   /// With empty pictures: their letters may happen to be words.
   static std::string without_pictures(std::string html) {
-    const std::string mark = "base64,";
+    const std::string mark = "image/png;base64,";
     for (std::size_t at = html.find(mark); at != std::string::npos; at = html.find(mark, at + 1)) {
       const std::size_t from = at + mark.size();
       html.erase(from, html.find('"', from) - from);

@@ -66,7 +66,7 @@ class Recording:
         if not 0 <= index < len(self):
             raise IndexError(f"{self.name}: frame {index} of {len(self)}")
         read = self._core.stored if self._raw else self._core.read
-        return Frame(*read(index), self._camera)
+        return Frame(*read(index), camera=self._camera)  # type: ignore[misc]
 
     def __iter__(self) -> Iterator[Frame]:
         """All frames in order. Those that cannot be read are left out, with a warning each, as the program does."""
