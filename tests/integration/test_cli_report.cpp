@@ -168,7 +168,7 @@ TEST_F(Report, AccuracyAgainstTruthAndSavedEvaluations) {
   write("out/evaluation_c.json", "{ damaged");
   const std::string saved = page("out");
   EXPECT_TRUE(has(saved, "evaluation.json") && has(saved, "evaluation of a path"));
-  EXPECT_TRUE(has(saved, "<td class=\"n\">2.5</td>") && has(saved, "evaluation_c.json is no output"));
+  EXPECT_TRUE(has(saved, "<td class=\"n\">2.5</td>") && has(saved, "evaluation_c.json is not output"));
 
   EXPECT_EQ(run("report out --truth nothing --force").code, 3);
   const Outcome empty = run("report out --truth out --force");
