@@ -65,14 +65,18 @@ class Case:
     def to_and_fro(self, room, frames):
         """The room's frames again and again, forwards and backwards, 30 a second."""
         folder = self.work / "long"
-        folder.mkdir()
+        for kind in ("rgb", "depth"):
+            (folder / kind).mkdir(parents=True)
         lines = [line.split() for line in (room / "associations.txt").read_text().splitlines() if not line.startswith("#")]
         turn = list(range(len(lines))) + list(range(len(lines) - 2, 0, -1))
         with open(folder / "associations.txt", "w", encoding="utf-8") as out:
             for i in range(frames):
                 _, color, _, depth = lines[turn[i % len(turn)]]
                 stamp = f"{100 + i / RATE_HZ:.6f}"
-                out.write(f"{stamp} {room / color} {stamp} {room / depth}\n")
+                # Each image has a name of its own: one that is named a second time is not used.
+                os.link(room / color, folder / "rgb" / f"{i}.png")
+                os.link(room / depth, folder / "depth" / f"{i}.png")
+                out.write(f"{stamp} rgb/{i}.png {stamp} depth/{i}.png\n")
         shutil.copy(room / "camera.yaml", folder)
         return folder
 
