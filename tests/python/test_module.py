@@ -88,7 +88,7 @@ class Recordings(Folder):
 class Mapping(Folder):
     def fed(self, **options):
         recording = plumbline.open(self.recording, raw=True)
-        with plumbline.Mapper(recording.camera, **options) as mapper:
+        with plumbline.Mapper(recording.camera, name=Path(self.recording).name, **options) as mapper:
             tracked = [mapper.feed(f.color, f.depth, f.stamp, depth_stamp=f.depth_stamp) for f in recording]
             return tracked, mapper.finish()
 
@@ -107,7 +107,9 @@ class Mapping(Folder):
     def test_one_after_the_other_gives_the_same(self):
         """Whoever waits for each pose before the next frame, with one thread."""
         recording = plumbline.open(self.recording, raw=True)
-        with plumbline.Mapper(recording.camera, threads=1, output=self.work / "slowly") as mapper:
+        with plumbline.Mapper(
+            recording.camera, name=Path(self.recording).name, threads=1, output=self.work / "slowly"
+        ) as mapper:
             for f in recording:
                 pose = mapper.feed(f.color, f.depth, f.stamp, depth_stamp=f.depth_stamp).pose
                 self.assertEqual(pose.shape, (4, 4))
@@ -325,7 +327,7 @@ class Results(Folder):
         program("render", self.work / "out", "-o", self.work / "by_program.png", "--view", "top", "--size", "320x240",
                 "--annotations", "off")
         self.assertTrue(filecmp.cmp(self.work / "top.png", self.work / "by_program.png", shallow=False))
-        self.assertEqual(plumbline.render(self.result.cloud, size=(64, 48)).shape, (48, 64, 3))
+        self.assertEqual(plumbline.render(self.result.cloud, size=(96, 64)).shape, (64, 96, 3))
 
     def test_maps_are_fused(self):
         other = plumbline.map(self.recording, self.work / "other", start=0.4)
