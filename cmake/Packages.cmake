@@ -27,6 +27,20 @@ function(plumbline_package component name section summary description)
   string(TOUPPER ${component} upper)
   set(CPACK_DEBIAN_${upper}_PACKAGE_NAME ${name} PARENT_SCOPE)
   set(CPACK_DEBIAN_${upper}_PACKAGE_SECTION ${section} PARENT_SCOPE)
+  # Lines of at most 78 characters.
+  string(REPLACE " " ";" words "${description}")
+  set(description "")
+  set(line "")
+  foreach(word ${words})
+    string(LENGTH "${line} ${word}" length)
+    if(length GREATER 78)
+      string(APPEND description "${line}\n")
+      set(line "")
+    endif()
+    string(APPEND line " ${word}")
+    string(STRIP "${line}" line)
+  endforeach()
+  string(APPEND description "${line}")
   set(CPACK_COMPONENT_${upper}_DESCRIPTION "${summary}\n${description}" PARENT_SCOPE)
   set(CPACK_DEBIAN_${upper}_DESCRIPTION "${summary}\n${description}" PARENT_SCOPE)
   # Each package has its own copyright and changelog, as Debian wants it.
@@ -52,16 +66,19 @@ set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "plumbline-net (${this_version}), pl
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS "ffmpeg, plumbline-doc")
 set(CPACK_DEBIAN_NET_PACKAGE_DEPENDS "plumbline (${this_version})")
 set(CPACK_DEBIAN_ROS1_PACKAGE_DEPENDS "plumbline (${this_version})")
-set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "plumbline (${this_version}), python3 (>= 3.9), python3-numpy")
+set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "plumbline (${this_version}), python3-numpy")
 set(CPACK_DEBIAN_DEV_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_DOC_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_DOC_PACKAGE_ARCHITECTURE all)
 # What cmake/plumblineConfig.cmake.in looks for.
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "plumbline (${this_version}), libpcl-dev, libopencv-dev, libopencv-contrib-dev, libeigen3-dev, libceres-dev, libtbb-dev, libyaml-cpp-dev, libspdlog-dev, libfmt-dev, nlohmann-json3-dev, libexpected-dev, libembree-dev, libnanoflann-dev, robin-map-dev, libsqlite3-dev, libzstd-dev, liblz4-dev, libdeflate-dev, libjpeg-dev")
-if(Python_VERSION_MAJOR)
-  math(EXPR next_minor "${Python_VERSION_MINOR} + 1")
-  string(APPEND CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS ", python3 (>= ${Python_VERSION_MAJOR}.${Python_VERSION_MINOR}), python3 (<< ${Python_VERSION_MAJOR}.${next_minor})")
+if(PLUMBLINE_PYTHON_VERSION MATCHES "^([0-9]+)\\.([0-9]+)") # the compiled part is for this one alone
+  math(EXPR next_minor "${CMAKE_MATCH_2} + 1")
+  string(APPEND CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS ", python3 (>= ${CMAKE_MATCH_1}.${CMAKE_MATCH_2}), python3 (<< ${CMAKE_MATCH_1}.${next_minor})")
 endif()
+
+set(CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/scripts/packaging/python/postinst
+    ${PROJECT_SOURCE_DIR}/scripts/packaging/python/prerm)
 
 # The hub as a service.
 install(FILES ${PROJECT_SOURCE_DIR}/scripts/plumbline-hub.service DESTINATION lib/systemd/system COMPONENT net EXCLUDE_FROM_ALL)

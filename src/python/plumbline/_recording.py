@@ -66,7 +66,8 @@ class Recording:
         if not 0 <= index < len(self):
             raise IndexError(f"{self.name}: frame {index} of {len(self)}")
         read = self._core.stored if self._raw else self._core.read
-        return Frame(*read(index), camera=self._camera)  # type: ignore[misc]
+        number, stamp, depth_stamp, color, depth, odometry = read(index)
+        return Frame(number, stamp, depth_stamp, color, depth, odometry, self._camera)
 
     def __iter__(self) -> Iterator[Frame]:
         """All frames in order. Those that cannot be read are left out, with a warning each, as the program does."""

@@ -252,6 +252,10 @@ class Mapper:
         if self._result is None:
             self._run.abandon()
             self._run.run.request_stop()
+            if self._temporary is not None and os.getpid() == self._process:
+                while not self._run.run.wait(_LOOK_UP):
+                    pass
+                self._temporary.cleanup()
 
     @property
     def waiting(self) -> int:
