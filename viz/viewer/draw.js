@@ -3,7 +3,7 @@
 
 class Painter {
   constructor(canvas) {
-    const gl = canvas.getContext('webgl2', { antialias: false, alpha: false, depth: false, powerPreference: 'high-performance' });
+    const gl = canvas.getContext('webgl2', { antialias: false, alpha: false, depth: false });
     if (!gl) throw new Error('no WebGL 2');
     this.canvas = canvas;
     this.gl = gl;
@@ -14,7 +14,6 @@ class Painter {
     this.setPalette(new Uint8Array(768));
     this.targets = [null, null];
     this.front = 0;
-    gl.disable(gl.DITHER);
   }
 
   program(vertex, fragment) {

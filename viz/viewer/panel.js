@@ -3,19 +3,19 @@
 const kHelp = [
   ['Drag', 'turn; in the top view move'],
   ['Right button, Shift, two fingers', 'move'],
-  ['Wheel, pinch, + −', 'nearer to what the pointer is on (in a report click the picture first)'],
-  ['Double click', 'make this the middle'],
-  ['W A S D, Q E', 'walk, lower and higher; three fingers likewise'],
+  ['Wheel, pinch, + −', 'nearer to the pointer (in a report click first)'],
+  ['Double click', 'the new middle'],
+  ['W A S D, Q E', 'walk, lower, higher; three fingers walk'],
   ['Arrows, with Shift', 'turn, move'],
   ['1, 2, 3', 'orbit, walk, top view'],
   ['Home', 'the whole map'],
   ['Click', 'coordinates, and the picture that saw it best'],
-  ['M, Enter, Backspace', 'next measuring tool, end of a line or area, last measurement away'],
+  ['M, Enter, Backspace', 'next tool, end of a line, take the last away'],
   ['Space', 'a click in the middle of the picture'],
   ['C', 'next cut: none, heights, box; drag its handles'],
   ['L', 'next colouring'],
-  ['X', 'the other of two maps'],
-  ['P', 'fly along the path, or stop'],
+  ['X', 'the other map'],
+  ['P', 'fly along the path, stop'],
   ['?', 'this help'],
 ];
 
@@ -34,7 +34,7 @@ class Panel {
   constructor(root, scene, data) {
     this.root = root;
     this.scene = scene;
-    this.canvas = element('canvas', { class: 'pv-canvas', tabindex: 0, 'aria-label': `Map of ${scene.name} to turn and walk through; press ? for the keys` });
+    this.canvas = element('canvas', { class: 'pv-canvas', tabindex: 0, 'aria-label': `Map of ${scene.name}; ? tells the keys` });
     this.overlay = element('canvas', { class: 'pv-over', 'aria-hidden': 'true' });
     root.append(this.canvas, this.overlay);
     this.view = new View(scene, data, this.canvas, this.overlay);
@@ -88,11 +88,11 @@ class Panel {
     this.told = element('div', { class: 'pv-told', role: 'status' });
     this.list = element('ol', { class: 'pv-list' });
     this.results = element('div', { class: 'pv-results', hidden: true }, this.list,
-      this.button('Copy', 'Copy measurements as text', () => this.copy(this.measuring.text(), 'measurements copied')));
+      this.button('Copy', 'Copy as text', () => this.copy(this.measuring.text(), 'measurements copied')));
     this.thumb = element('img', { class: 'pv-thumb', alt: 'picture of the keyframe', hidden: true });
     this.time = element('input', { type: 'range', min: 0, max: 1000, step: 1, value: 0, 'aria-label': 'Time along the path', oninput: () => this.goTo(this.time.value / 1000) });
     this.stamp = element('span');
-    this.timeBar = element('div', { class: 'pv-time', hidden: !scene.paths.length }, this.button('▶', 'Fly along the path (P)', () => this.fly()), this.time, this.stamp);
+    this.timeBar = element('div', { class: 'pv-time', hidden: !scene.paths.length }, this.button('▶', 'Fly (P)', () => this.fly()), this.time, this.stamp);
     this.dialog = element('dialog', { class: 'pv-help', 'aria-label': 'Keys' }, element('table', {}, ...kHelp.map(([keys, what]) =>
       element('tr', {}, element('th', {}, keys), element('td', {}, what)))), this.button('Close', '', () => this.dialog.close()));
     this.root.append(this.bar, element('div', { class: 'pv-low' }, this.thumb, this.results, this.told, this.legend, this.timeBar), this.dialog);
@@ -122,7 +122,7 @@ class Panel {
     box.append(this.cutBox, this.button('Save picture (PNG)', '', () => this.savePicture()),
       this.button('Save points (PLY)', '', () => this.savePoints()),
       this.button('Copy link to this view', '', () => this.copyLink()),
-      this.button('Full screen', '', () => (document.fullscreenElement ? document.exitFullscreen() : this.root.requestFullscreen())));
+      this.button('Full screen', '', () => this.root.requestFullscreen()));
     return box;
   }
 
@@ -453,7 +453,7 @@ class Panel {
       this.hear('measured');
       if (s.l !== 'photo') view.setLayer(s.l);
     } catch (e) {
-      this.say('the link to a view is damaged; the whole map is shown');
+      this.say('the link is damaged: here is the whole map');
     }
   }
 }

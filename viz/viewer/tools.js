@@ -109,7 +109,7 @@ class Measuring {
     const tilt = Math.asin(clamp(Math.abs(plane.normal[2]), 0, 1)) * 180 / Math.PI;
     m.value = rms;
     m.plane = plane;
-    m.text = `plane flat to ${millimetres(rms)} (rms of ${off.length} points within 0.5 m), 90 % within ${millimetres(thick)}, ` +
+    m.text = `plane flat to ${millimetres(rms)} (rms of ${off.length} points), 90 % within ${millimetres(thick)}, ` +
       `${tilt > 45 ? `${(90 - tilt).toFixed(1)}° from level` : `${tilt.toFixed(1)}° from upright`}`;
   }
 

@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // plumbline view OUT [OTHER]
 #include <fmt/format.h>
+#include <pthread.h>
 
-#include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <memory>
-#include <thread>
 
 #include "app.hpp"
 #include "plumbline/exports/view.hpp"
 #include "plumbline/net/page_server.hpp"
 #include "plumbline/viewer/page.hpp"
 #include "recording_opener.hpp"
-#include "signals.hpp"
 
 namespace plumbline::cli {
 namespace {
@@ -40,12 +39,19 @@ core::Result<void> run_view(ViewCommand& command, Session& session) {
   if (!view) return tl::unexpected<core::Error>(view.error());
   for (const std::string& note : view->notes) console.info(note);
 
+  // From here on Ctrl-C ends it; the server's threads leave the signals to this one.
+  sigset_t ends;
+  sigemptyset(&ends);
+  sigaddset(&ends, SIGINT);
+  sigaddset(&ends, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &ends, nullptr);
+
   auto server = net::PageServer::start(*options, viewer::page(view->scene, exports::kViewGenerator));
   if (!server) return tl::unexpected<core::Error>(server.error());
   fmt::print("{}\n", server->address());
   std::fflush(stdout);
-  const core::StopToken& stop = stop_on_signals();
-  while (!stop.stop_requested()) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  int signal = 0;
+  sigwait(&ends, &signal);
   return {};
 }
 

@@ -11,7 +11,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <set>
+#include <tuple>
 
 #include "formats.hpp"
 #include "pages/compare.hpp"
@@ -19,40 +19,57 @@
 #include "pages/thumbnails.hpp"
 #include "paths/lines.hpp"
 #include "plans/walls.hpp"
-#include "plumbline/cloud/dense_fusion.hpp"
+#include "plumbline/cloud/columns.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/viewer/page.hpp"
 
 namespace plumbline::exports {
 namespace {
 
-/// Cells of this size that points of the cloud lie in.
-std::size_t occupied_cells(const cloud::Cloud& cloud, double cell_m) {
-  std::vector<std::array<std::int32_t, 3>> cells;
-  cells.reserve(cloud.size());
-  for (const cloud::Point& p : cloud) {
-    cells.push_back({static_cast<std::int32_t>(std::floor(p.x / cell_m)),
-                     static_cast<std::int32_t>(std::floor(p.y / cell_m)),
-                     static_cast<std::int32_t>(std::floor(p.z / cell_m))});
+/// A point of each cell of this size that has any: the one of the highest confidence, or the first; in order.
+std::vector<std::size_t> one_of_each_cell(const cloud::CloudFile& file, double cell_m) {
+  struct Candidate {
+    std::array<std::int32_t, 3> cell;
+    float doubt;
+    std::size_t index;
+    bool operator<(const Candidate& other) const {
+      return std::tie(cell, doubt, index) < std::tie(other.cell, other.doubt, other.index);
+    }
+  };
+  const std::vector<float>& confidence = file.columns.confidence;
+  std::vector<Candidate> candidates;
+  candidates.reserve(file.cloud->size());
+  for (std::size_t i = 0; i < file.cloud->size(); ++i) {
+    const cloud::Point& p = (*file.cloud)[i];
+    const auto cell = [&](float v) { return static_cast<std::int32_t>(std::floor(v / cell_m)); };
+    candidates.push_back({{cell(p.x), cell(p.y), cell(p.z)}, confidence.empty() ? 0.0F : -confidence[i], i});
   }
-  std::sort(cells.begin(), cells.end());
-  return static_cast<std::size_t>(std::unique(cells.begin(), cells.end()) - cells.begin());
+  std::sort(candidates.begin(), candidates.end());
+
+  std::vector<std::size_t> chosen;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    if (i == 0 || candidates[i].cell != candidates[i - 1].cell) chosen.push_back(candidates[i].index);
+  }
+  std::sort(chosen.begin(), chosen.end());
+  return chosen;
 }
 
 /// The cloud in the smallest voxels, about, that leave no more than `most` points.
 cloud::CloudFile thinned_cloud(const cloud::CloudFile& file, std::size_t most) {
   double cell_m = 0.005;
-  for (int round = 0; round < 12; ++round) {
-    const std::size_t count = occupied_cells(*file.cloud, cell_m);
-    if (count <= most) break;
+  std::vector<std::size_t> chosen = one_of_each_cell(file, cell_m);
+  for (int round = 0; round < 20 && chosen.size() > most; ++round) {
     // Surfaces have four times as few points in voxels twice as wide.
-    cell_m *= std::max(1.03, 1.01 * std::sqrt(static_cast<double>(count) / static_cast<double>(most)));
+    const double ratio = static_cast<double>(chosen.size()) / static_cast<double>(most);
+    cell_m *= std::max(1.02, 1.01 * std::sqrt(ratio));
+    chosen = one_of_each_cell(file, cell_m);
   }
 
-  cloud::FusedCloud coarse = cloud::coarser(*file.cloud, file.columns, cell_m);
   cloud::CloudFile out;
-  out.cloud = std::move(coarse.cloud);
-  out.columns = std::move(coarse.columns);
+  out.cloud = std::make_shared<cloud::Cloud>();
+  out.cloud->reserve(chosen.size());
+  for (const std::size_t i : chosen) out.cloud->push_back((*file.cloud)[i]);
+  out.columns = cloud::pick_columns(file.columns, chosen);
   out.shift = file.shift;
   out.has_color = file.has_color;
   out.has_normals = file.has_normals;
