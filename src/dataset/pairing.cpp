@@ -17,18 +17,22 @@ bool earlier(const StampedFile& file, double stamp) { return file.stamp < stamp;
 
 }  // namespace
 
+long long stamp_gap_us(double color_stamp, double depth_stamp, double depth_delay_s) {
+  return std::llround(std::abs(depth_stamp - (color_stamp - depth_delay_s)) / kStampResolution);
+}
+
 std::vector<PairInfo> pair_by_stamp(const std::vector<StampedFile>& color,
                                     const std::vector<StampedFile>& depth, double max_gap_s,
                                     double depth_delay_s) {
   const double reach = max_gap_s + kStampResolution;
-  // Gap in microseconds, which is what stamps are good to; colour, depth.
+  // Gap, colour, depth.
   std::vector<std::tuple<long long, std::size_t, std::size_t>> candidates;
 
   for (std::size_t i = 0; i < color.size(); ++i) {
     const double stamp = color[i].stamp - depth_delay_s;  // of depth taken at the same moment
     for (auto d = std::lower_bound(depth.begin(), depth.end(), stamp - reach, earlier);
          d != depth.end() && d->stamp <= stamp + reach; ++d) {
-      candidates.emplace_back(std::llround(std::abs(d->stamp - stamp) / kStampResolution), i,
+      candidates.emplace_back(stamp_gap_us(color[i].stamp, d->stamp, depth_delay_s), i,
                               static_cast<std::size_t>(d - depth.begin()));
     }
   }

@@ -54,7 +54,7 @@ class MessageSink {
   /// Error (kUsage): the network refuses it.
   virtual core::Result<void> announce(const std::string& topic, const std::string& type,
                                       Retention retention) = 0;
-  /// Sends a message of an announced topic. Waits for slow listeners, one second at most.
+  /// Sends a message of an announced topic. Waits for slow listeners, two seconds at most.
   virtual core::Result<void> send(const std::string& topic, const std::vector<std::uint8_t>& bytes) = 0;
   /// Number of current listeners to the topic.
   virtual std::size_t listeners(const std::string& topic) = 0;

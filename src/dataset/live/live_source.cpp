@@ -17,10 +17,9 @@ namespace {
 
 constexpr const char* kScheme = "ros2://";
 
-/// State that all views of one live camera share.
+/// What all views of one live camera share.
 struct LiveCamera {
   std::string name;
-  std::string address;
   std::string doubt;
   Layout layout;  ///< of the first frames; its images are the stream
   std::shared_ptr<LiveStream> stream;
@@ -93,7 +92,9 @@ core::Result<void> fits_live(const std::string& address, const OpenOptions& opti
                       : options.format != "auto" && !options.format.empty() ? "--format"
                       : options.poses == PoseUse::kGiven                    ? "--poses given"
                                                                             : nullptr;
-  if (wrong == nullptr) return {};
+  if (wrong == nullptr)
+    return options.live.record.empty() ? core::Result<void>()
+                                       : LiveRecord::check(options.live.record, options.live.replace);
   return core::usage_error(
       fmt::format("{}: is live; {} is about recordings (--for S ends the run)", address, wrong));
 }
@@ -134,7 +135,45 @@ core::Result<sensor::Camera> complete_live_camera(const std::string& address, co
   return complete;
 }
 
-/// "ros2://0?color=..." is called "ros2_0".
+std::shared_ptr<LiveStream> make_stream(const std::string& address, std::unique_ptr<MessageStream> stream,
+                                        const ChosenTopics& topics, const std::optional<ChosenCamera>& chosen,
+                                        const OpenOptions& options, core::Log& log) {
+  LiveStream::Options how;
+  how.address = address;
+  how.max_pair_gap_s = options.max_pair_gap_s;
+  if (chosen) how.depth_delay_s = chosen->reading.camera.depth_delay_s;
+  how.for_s = options.live.for_s;
+  how.stop = options.live.stop;
+  how.most_waiting_bytes = options.live.most_waiting_bytes;
+  const auto topic = [](const ChosenTopic& of) { return LiveTopic{of.topic->topic, of.topic->decoder}; };
+  return std::make_shared<LiveStream>(std::move(stream), topic(topics.color), topic(topics.depth), how, log);
+}
+
+/// What came while the camera was looked for are the first frames. Error (kInput): none can be made.
+core::Result<void> begin(const std::string& address, const LiveSurvey& found, const ChosenTopics& topics,
+                         const OpenOptions& options, LiveCamera& live) {
+  for (const LiveMessage& message : found.images) live.stream->add(message);
+  if (!live.stream->wait_for_first(options.live.patience)) {
+    return core::input_error(fmt::format(
+        "{}: images of {} and {} come, but none of the two within {:g} s of each other; name "
+        "topics of one camera with ?color=/TOPIC&depth=/TOPIC",
+        address, topics.color.topic->topic.name, topics.depth.topic->topic.name, options.max_pair_gap_s));
+  }
+  live.layout.format = "ros2";
+  live.layout.pairs = live.stream->infos();
+  live.layout.images = live.stream;
+  return {};
+}
+
+/// Null where nothing is to be recorded.
+core::Result<std::unique_ptr<LiveRecord>> make_record(const LiveOptions& options, const BagSurvey& survey,
+                                                      const ChosenTopics& topics,
+                                                      const sensor::Camera& camera) {
+  if (options.record.empty()) return nullptr;
+  return LiveRecord::create(options.record, topics_of(topics), infos_of(survey, topics), camera);
+}
+
+/// "ros2://0?color=..." is called "ros2_0"; what is recorded is called as the record is.
 std::string name_of_address(const std::string& address) {
   std::string name;
   for (const char c : address.substr(0, address.find('?'))) {
@@ -151,54 +190,28 @@ bool is_live_address(const std::string& input) { return input.rfind(kScheme, 0) 
 core::Result<std::unique_ptr<FrameSource>> open_live(const std::string& address,
                                                      std::unique_ptr<MessageStream> stream,
                                                      const OpenOptions& options, core::Log& log) {
-  const LiveOptions& live_options = options.live;
+  const LiveOptions& how = options.live;
   if (auto fits = fits_live(address, options); !fits) return tl::unexpected(fits.error());
-  if (!live_options.record.empty()) {
-    if (auto can = LiveRecord::check(live_options.record, live_options.replace); !can)
-      return tl::unexpected(can.error());
-  }
   const auto chosen = choose_camera(address, options, log);
   if (!chosen) return tl::unexpected(chosen.error());
 
   // Listen until it is clear what the camera is.
-  const auto found =
-      survey_stream(address, *stream, options.topics, live_options.patience, live_options.stop);
+  const auto found = survey_stream(address, *stream, options.topics, how.patience, how.stop);
   if (!found) return tl::unexpected(found.error());
   const auto topics = choose_topics(found->survey, options.topics);
   if (!topics) return tl::unexpected(topics.error());
   log.info(fmt::format("{}: colour from {}, depth from {}", address, topics->color.topic->topic.name,
                        topics->depth.topic->topic.name));
 
-  LiveStream::Options how;
-  how.address = address;
-  how.max_pair_gap_s = options.max_pair_gap_s;
-  if (*chosen) how.depth_delay_s = (*chosen)->reading.camera.depth_delay_s;
-  how.for_s = live_options.for_s;
-  how.stop = live_options.stop;
-  how.most_waiting_bytes = live_options.most_waiting_bytes;
-
   auto live = std::make_shared<LiveCamera>();
-  live->name = name_of_address(address);
-  live->address = address;
-  live->stream = std::make_shared<LiveStream>(
-      std::move(stream), LiveTopic{topics->color.topic->topic, topics->color.topic->decoder},
-      LiveTopic{topics->depth.topic->topic, topics->depth.topic->decoder}, how, log);
+  live->name = how.record.empty() ? name_of_address(address) : how.record.stem().string();
+  live->stream = make_stream(address, std::move(stream), *topics, *chosen, options, log);
+  if (auto begun = begin(address, *found, *topics, options, *live); !begun)
+    return tl::unexpected(begun.error());
 
-  // Images that came meanwhile are the first frames.
-  for (const LiveMessage& message : found->images) live->stream->add(message);
-  if (!live->stream->wait_for_first(live_options.patience)) {
-    return core::input_error(fmt::format(
-        "{}: images of {} and {} come, but none of the two within {:g} s of each other; name "
-        "topics of one camera with ?color=/TOPIC&depth=/TOPIC",
-        address, topics->color.topic->topic.name, topics->depth.topic->topic.name, options.max_pair_gap_s));
-  }
-
-  live->layout.format = "ros2";
-  live->layout.pairs = live->stream->infos();
-  live->layout.images = live->stream;
+  // The first frames say the rest, as those of a recording do.
   const auto camera = complete_live_camera(address, options, *chosen, *found, *topics, live->layout, log);
   if (!camera) return tl::unexpected(camera.error());
-
   auto source =
       std::make_unique<LiveSource>(live, *camera, camera->color, std::vector<double>{camera->depth_delay_s});
   const auto doubt = check_depth_scale(*source, address);
@@ -206,15 +219,9 @@ core::Result<std::unique_ptr<FrameSource>> open_live(const std::string& address,
   if (!doubt->empty()) log.warning(*doubt);
   live->doubt = *doubt;
 
-  std::unique_ptr<LiveRecord> record;
-  if (!live_options.record.empty()) {
-    auto created = LiveRecord::create(live_options.record, topics_of(*topics),
-                                      infos_of(found->survey, *topics), *camera);
-    if (!created) return tl::unexpected(created.error());
-    record = std::move(*created);
-  }
-
-  live->stream->start(std::move(record));
+  auto record = make_record(how, found->survey, *topics, *camera);
+  if (!record) return tl::unexpected(record.error());
+  live->stream->start(std::move(*record));
   return source;
 }
 

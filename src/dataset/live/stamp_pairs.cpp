@@ -12,12 +12,13 @@ namespace {
 
 constexpr std::size_t kMostAlone = 64;  // images of one kind that wait for the other
 constexpr std::int64_t kMicrosecond_ns = 1000;
-constexpr double kStampResolution_s = 1e-6;
 
 }  // namespace
 
 StampPairs::StampPairs(double max_gap_s, double depth_delay_s)
-    : reach_us_(std::llround(max_gap_s * 1e6)), delay_ns_(std::llround(depth_delay_s * 1e9)) {}
+    : reach_us_(std::llround(max_gap_s * 1e6)),
+      delay_s_(depth_delay_s),
+      delay_ns_(std::llround(depth_delay_s * 1e9)) {}
 
 void StampPairs::add(List& list, Stamped image) {
   const auto later = [](std::int64_t stamp, const Stamped& other) { return stamp < other.stamp_ns; };
@@ -27,10 +28,8 @@ void StampPairs::add(List& list, Stamped image) {
   ++unpaired_;
 }
 
-std::int64_t StampPairs::gap(const Stamped& color, const Stamped& depth) const {
-  // In the same numbers, and rounded likewise: of gaps that are all but alike the same one is smaller.
-  const double moment_s = seconds_of(color.stamp_ns) - static_cast<double>(delay_ns_) * 1e-9;
-  return std::llround(std::abs(seconds_of(depth.stamp_ns) - moment_s) / kStampResolution_s);
+long long StampPairs::gap(const Stamped& color, const Stamped& depth) const {
+  return stamp_gap_us(seconds_of(color.stamp_ns), seconds_of(depth.stamp_ns), delay_s_);
 }
 
 std::optional<std::size_t> StampPairs::nearest_depth(std::size_t color) const {
@@ -56,7 +55,6 @@ std::optional<StampPairs::Pair> StampPairs::next(bool final) {
     const bool same_moment = depth && gap(color_.front(), depth_[*depth]) == 0;
     const bool depth_certain = final || same_moment || (!depth_.empty() && depth_.back().stamp_ns >= when);
     if (!depth_certain) return std::nullopt;
-
     if (!depth) {
       // Nothing near it has come, and nothing can.
       if (!final && depth_.back().stamp_ns < when + reach_us_ * kMicrosecond_ns) return std::nullopt;

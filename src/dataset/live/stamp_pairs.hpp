@@ -37,12 +37,13 @@ class StampPairs {
  private:
   using List = std::deque<Stamped>;
   void add(List& list, Stamped image);
-  /// Gap of a colour to a depth, microseconds, as pair_by_stamp has it.
-  [[nodiscard]] std::int64_t gap(const Stamped& color, const Stamped& depth) const;
+  /// stamp_gap_us of the two.
+  [[nodiscard]] long long gap(const Stamped& color, const Stamped& depth) const;
   [[nodiscard]] std::optional<std::size_t> nearest_depth(std::size_t color) const;
   [[nodiscard]] std::optional<std::size_t> nearest_color(std::size_t depth) const;
 
   std::int64_t reach_us_;
+  double delay_s_;
   std::int64_t delay_ns_;
   List color_;  ///< by stamp
   List depth_;

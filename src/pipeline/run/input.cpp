@@ -52,7 +52,7 @@ core::Result<std::unique_ptr<dataset::FrameSource>> select_frames(
   return std::make_unique<SelectedFrames>(std::move(source), std::move(indices));
 }
 
-constexpr double kNoEnd_s = 1e299;
+constexpr double kForever_s = 1e299;
 
 core::Result<std::unique_ptr<dataset::FrameSource>> open_live_input(const std::string& address,
                                                                     dataset::OpenOptions options,
@@ -76,7 +76,7 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_input(const std::string
                                                                const core::Executor& executor,
                                                                core::Log& log) {
   if (dataset::is_live_address(input)) return open_live_input(input, options, log);
-  if (!options.live.record.empty() || options.live.for_s < kNoEnd_s) {
+  if (!options.live.record.empty() || options.live.for_s < kForever_s) {
     return core::usage_error(
         fmt::format("{}: is a recording; --record and --for are for live cameras (ros2://DOMAIN)", input));
   }

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Listens to what a run publishes, with an implementation of ROS 2's network that others wrote (@foxglove/ros2), decodes
-// it with theirs, and tells what came: node judge_ros2.mjs DOMAIN PREFIX [SECONDS]. JUDGES: their node_modules.
+// it with theirs, and tells what came: node judge_ros2.mjs DOMAIN PREFIX [SECONDS [ROBOT]]. JUDGES: their node_modules.
 import { createRequire } from "node:module";
 
 const require = createRequire(process.env.JUDGES + "/");
 const { RosNode } = require("@foxglove/ros2");
-const { UdpSocketNode } = require("@foxglove/ros2/nodejs");
+const { UdpSocketNode, getNetworkInterfaces } = require("@foxglove/ros2/nodejs");
 const { parse } = require("@foxglove/rosmsg");
 const { MessageReader } = require("@foxglove/rosmsg2-serialization");
 
 const [domain, prefix, seconds] = [Number(process.argv[2]), process.argv[3], Number(process.argv[4] ?? 60)];
+const robot = process.argv[5] ?? prefix; // whose path and points are listened to
 
 const header = "std_msgs/Header header\n";
 const separator = "================================================================================\nMSG: ";
@@ -70,7 +71,7 @@ function take(name, message) {
 
 const ros = new RosNode({
   name: "judge",
-  addresses: ["127.0.0.1"],
+  getNetworkInterfaces,
   domainId: domain,
   udpSocketCreate: UdpSocketNode.Create,
   log: process.env.VERBOSE ? console : undefined,
@@ -84,8 +85,8 @@ const end = () => {
 };
 const topics = [
   ["tf", "/tf", "tf2_msgs/msg/TFMessage"],
-  ["path", `/${prefix}/path`, "nav_msgs/msg/Path"],
-  ["points", `/${prefix}/points`, "sensor_msgs/msg/PointCloud2"],
+  ["path", `/${robot}/path`, "nav_msgs/msg/Path"],
+  ["points", `/${robot}/points`, "sensor_msgs/msg/PointCloud2"],
   ["map", `/${prefix}/map`, "sensor_msgs/msg/PointCloud2"],
 ];
 for (const [name, topic, dataType] of topics) {

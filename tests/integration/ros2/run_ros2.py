@@ -4,6 +4,7 @@
 
     live      600 frames at 30 Hz: nearly all are taken, and what was recorded of them maps to the same bytes
     messages  what is told when there is no camera, or no certain one, and when addresses make no sense
+    robots    two robots and their hub publish, and are told apart by name; the judge listens to the hub
     judge     what a run publishes is received by @foxglove/ros2 on Node (scripts/install-deps --judges; without it the
               exit code is 77)
 """
@@ -140,16 +141,25 @@ def messages(case):
         case.end(playing, "play.log")
 
 
+def has_route():
+    """Whether there is an interface beside lo: the judge finds others by multicast only."""
+    routes = Path("/proc/net/route").read_text(encoding="utf-8").splitlines()[1:]
+    return any(line.split()[1] == "00000000" for line in routes)
+
+
 def judge(case):
     if shutil.which("node") is None or not (judges() / "@foxglove/ros2").is_dir():
         print(f"no @foxglove/ros2 in {judges()}")
+        return SKIPPED
+    if not has_route():
+        print("no network whose multicast the judge could listen to")
         return SKIPPED
     room = case.world(60)
     listening = subprocess.Popen(["node", HERE / "judge_ros2.mjs", str(case.domain), "plumbline", "300"],
                                  env={**os.environ, "JUDGES": str(judges())}, stdout=subprocess.PIPE,
                                  stderr=open(case.work / "judge.log", "w", encoding="utf-8"), text=True)
     time.sleep(3.0)
-    case.run("map", room, "-o", case.work / "out", "--publish", case.address(), "-q")
+    case.run("map", room, "-o", case.work / "out", "--publish", f"ros2://{case.domain}", "-q")
     heard, _ = listening.communicate(timeout=60)
     check(listening.returncode == 0, f"nothing was heard: {heard}\n{case.log('judge.log')}")
     told = json.loads(heard)
@@ -169,11 +179,44 @@ def judge(case):
     return 0
 
 
+def robots(case):
+    if shutil.which("node") is None or not (judges() / "@foxglove/ros2").is_dir() or not has_route():
+        print(f"no @foxglove/ros2 in {judges()}, or no network that it could listen to")
+        return SKIPPED
+    listening = subprocess.Popen(["node", HERE / "judge_ros2.mjs", str(case.domain), "plumbline", "400", "r0"],
+                                 env={**os.environ, "JUDGES": str(judges())}, stdout=subprocess.PIPE,
+                                 stderr=open(case.work / "judge.log", "w", encoding="utf-8"), text=True)
+    time.sleep(3.0)
+    # Robots and hub have a domain of their own; what they publish is in another one.
+    lan = ["--interface", "lo", "--domain", case.domain + 95]
+    publish = ["--publish", f"ros2://{case.domain}"]
+    hub = case.start("hub", "-o", case.work / "hub", "--robots", 2, *lan, *publish, log="hub.log")
+    world = "synth:room?frames=240&seed=1"
+    first = case.start("robot", world, "--to", 6, "--name", "r0", "-o", case.work / "r0", *lan, *publish, log="r0.log")
+    second = case.start("robot", world, "--from", 2, "--name", "r1", "-o", case.work / "r1", *lan, log="r1.log")
+    for process, name in ((first, "r0.log"), (second, "r1.log"), (hub, "hub.log")):
+        case.end(process, name, timeout=900)
+    heard, _ = listening.communicate(timeout=120)
+    check(listening.returncode == 0, f"nothing was heard of the hub: {heard}\n{case.log('judge.log')}")
+    told = json.loads(heard)
+    print(json.dumps(told))
+
+    summary = json.loads((case.work / "hub/summary.json").read_text())
+    check(told["map"]["points"] == summary["cloud"]["points"], f"{told['map']} of {summary['cloud']}")
+    check(told["map"]["frame"] == "map", told["map"])
+    chains = set(told["tf"]["chains"])
+    check({"r0/map -> r0/odom", "r0/odom -> r0/camera"} <= chains, chains)
+    check("r1/odom -> r1/camera" in chains, f"the hub tells where r1 is: {chains}")
+    check({"map -> r0/map", "map -> r1/map"} <= chains, f"the hub tells where maps lie: {chains}")
+    check(told["path"]["messages"] > 0 and told["points"]["messages"] > 0, told)
+    return 0
+
+
 def main():
     program, work, name = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve(), sys.argv[3]
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir(parents=True)
-    return {"live": live, "messages": messages, "judge": judge}[name](Case(program, work)) or 0
+    return {"live": live, "messages": messages, "judge": judge, "robots": robots}[name](Case(program, work)) or 0
 
 
 if __name__ == "__main__":

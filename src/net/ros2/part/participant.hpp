@@ -13,7 +13,9 @@
 
 namespace plumbline::net {
 
-constexpr std::int32_t kSamplesKept = 60;  ///< by readers and writers: two seconds of a camera
+// Samples that wait at either end, of a camera some seconds: a machine that is busy elsewhere loses none.
+constexpr std::int32_t kSamplesKeptByReader = 200;
+constexpr std::int32_t kSamplesKeptByWriter = 60;
 
 struct KnownType {
   const char* name;  ///< "sensor_msgs/Image"

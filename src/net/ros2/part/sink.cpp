@@ -113,9 +113,9 @@ class Ros2Sink final : public dataset::MessageSink {
     pin_representation(qos);
     const bool latest = retention == dataset::Retention::kLatest;
     // A reliable writer serves both kinds of reader; a slow one holds it up no longer than this.
-    dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, DDS_MSECS(500));
+    dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, DDS_SECS(2));
     dds_qset_durability(qos.get(), latest ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
-    dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, kSamplesKept);
+    dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, kSamplesKeptByWriter);
     if (latest) {
       dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_LAST, 1, DDS_LENGTH_UNLIMITED,
                                   DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);

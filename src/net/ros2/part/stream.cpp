@@ -109,7 +109,7 @@ class Ros2Stream final : public dataset::MessageStream {
     // Messages from before, as on /tf_static.
     dds_qset_durability(qos.get(),
                         offered.latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
-    dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, kSamplesKept);
+    dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, kSamplesKeptByReader);
     return qos;
   }
 
