@@ -199,6 +199,19 @@ core::Result<std::vector<std::uint8_t>> StoreReader::surface_bytes(KeyframeId ke
   return impl_->blob("SELECT data FROM surface WHERE robot = ? AND number = ?", keyframe, "");
 }
 
+core::Result<std::vector<std::uint8_t>> StoreReader::small_picture(KeyframeId keyframe) const {
+  return impl_->blob("SELECT small FROM picture WHERE robot = ? AND number = ?", keyframe, "");
+}
+
+core::Result<std::vector<std::uint8_t>> StoreReader::whole_picture(KeyframeId keyframe) const {
+  return impl_->blob("SELECT whole FROM picture WHERE robot = ? AND number = ?", keyframe, "");
+}
+
+core::Result<std::vector<KeyframeId>> StoreReader::whole_picture_ids() const {
+  return impl_->ids<KeyframeId>(
+      "SELECT robot, number FROM picture WHERE length(whole) > 0 ORDER BY robot, number");
+}
+
 core::Result<StoredSurface> unpack_surface(const std::vector<std::uint8_t>& bytes) {
   try {
     return decode_surface(unpack(bytes.data(), bytes.size()));

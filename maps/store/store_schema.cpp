@@ -50,6 +50,9 @@ void create_tables(Database& database) {
       "CREATE TABLE seen (robot INTEGER NOT NULL, number INTEGER NOT NULL, data BLOB NOT NULL,"
       " PRIMARY KEY (robot, number))");
   database.run(
+      "CREATE TABLE picture (robot INTEGER NOT NULL, number INTEGER NOT NULL, small BLOB NOT NULL,"
+      " whole BLOB NOT NULL, PRIMARY KEY (robot, number))");
+  database.run(
       "CREATE TABLE removed (place INTEGER NOT NULL, robot INTEGER NOT NULL, number INTEGER NOT NULL,"
       " changed INTEGER NOT NULL, PRIMARY KEY (place, robot, number))");
   database.run("PRAGMA user_version = " + std::to_string(kStoreFormat));

@@ -136,7 +136,8 @@ struct StoreWriter::Impl {
   void put_seen(FrameId frame, const SeenPoints& seen);
   void put_map_row(const MapChanges& map, std::int32_t robot);
   void put_cloud(const StoreCloud& cloud);
-  void put_log_and_clouds(const StoreStep& step);
+  void put_picture(const StorePicture& picture);
+  void put_extras(const StoreStep& step);
   /// All there is of the only map and its frames.
   void write(const Map& map, const std::vector<FramePose>& poses);
   /// `change` in a transaction; if it fails, the mirrors are reloaded from the file.
@@ -237,8 +238,19 @@ void StoreWriter::Impl::put_cloud(const StoreCloud& cloud) {
   put("REPLACE INTO surface VALUES (?, ?, ?, ?)", pack(encoded(*cloud.surface)));
 }
 
-void StoreWriter::Impl::put_log_and_clouds(const StoreStep& step) {
+void StoreWriter::Impl::put_picture(const StorePicture& picture) {
+  Statement(*database, "REPLACE INTO picture VALUES (?, ?, ?, ?)")
+      .bind(1, picture.keyframe.robot)
+      .bind(2, picture.keyframe.index)
+      .bind(3, picture.small)
+      .bind(4, picture.whole)
+      .run();
+}
+
+/// Clouds, pictures and log, which are beside the map.
+void StoreWriter::Impl::put_extras(const StoreStep& step) {
   for (const StoreCloud& cloud : step.clouds) put_cloud(cloud);
+  for (const StorePicture& picture : step.pictures) put_picture(picture);
   if (step.log.empty()) return;
   const std::int32_t robot = std::max(step.robot, 0);
   std::vector<std::string>& list = log_lines[robot];
@@ -344,7 +356,7 @@ core::Result<void> StoreWriter::add(const StoreStep& step) {
     for (const auto& [robot, size] : before) {
       mirror_list(robot, impl_->frame_lists[robot], size, impl_->frames);
     }
-    impl_->put_log_and_clouds(step);
+    impl_->put_extras(step);
     if (step.robots != nullptr) impl_->put_robots_of_map(*step.robots);
     impl_->put_map(*step.map, step.robot);
     put_complete(*impl_->database, impl_->transaction, false);
@@ -374,7 +386,7 @@ core::Result<void> StoreWriter::save_final(const Map& map, const std::vector<Fra
       guarded(impl_->file, ErrorKind::kOutput, [&] { impl_->database->run("PRAGMA synchronous = NORMAL"); });
   if (!synced) return synced;
   core::Result<void> done = impl_->transact([&] {
-    for (const StoreStep& step : rest) impl_->put_log_and_clouds(step);
+    for (const StoreStep& step : rest) impl_->put_extras(step);
     if (!robots.empty()) impl_->put_robots_of_map(robots);
     impl_->write(map, frames);
     put_complete(*impl_->database, impl_->transaction, true);

@@ -131,8 +131,8 @@ std::vector<std::pair<long long, std::string>> numbered_images(const std::filesy
 std::vector<PairInfo> pair_numbered(const std::vector<std::pair<long long, std::string>>& color,
                                     const std::vector<std::pair<long long, std::string>>& depth, double fps);
 
-/// How far apart images were taken, microseconds, which is what stamps in seconds since 1970 are good to:
-/// by that pairs are chosen. `depth_delay_s`: depth was taken so long after its stamp.
+/// Time between two images, microseconds, the resolution of stamps in seconds since 1970; pairs are chosen
+/// by it. `depth_delay_s`: depth was taken so long after its stamp.
 long long stamp_gap_us(double color_stamp, double depth_stamp, double depth_delay_s);
 
 /// Pairs by when images were taken, depth `depth_delay_s` after its stamps: smallest difference first, each

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // plumbline export and `exports:` as users meet them. Programs of others judge the files in judges/.
 #include <cmath>
+#include <opencv2/core.hpp>
 #include <sstream>
 #include <vector>
 
+#include "plumbline/dataset/image_io.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "program.hpp"
 
@@ -98,6 +100,43 @@ TEST_F(Exports, AllPathsAreOneAndRunsWriteTheirExports) {
   EXPECT_EQ(grid.code, 3) << grid;
   EXPECT_TRUE(grid.told("no map.db")) << grid;
   EXPECT_EQ(run("export out -o late.las").code, 0);
+}
+
+/// The recording is gone: models have the pictures that the map keeps.
+TEST_F(Exports, KeptPicturesReplaceARecordingThatIsGone) {
+  ASSERT_EQ(run("synth room -o world --frames 60 --width 320 --height 240 -q").code, 0);
+  const Outcome mapped = run("map world/robot0 -o out -q --set store.images=whole --set output.views=");
+  ASSERT_EQ(mapped.code, 0) << mapped;
+  ASSERT_EQ(run("export out -o with --format colmap").code, 0);
+  fs::rename(path("world"), path("elsewhere"));
+
+  const Outcome colmap = run("export out -o without --format colmap");
+  ASSERT_EQ(colmap.code, 0) << colmap;
+  const auto read = [&](const std::string& file) { return dataset::read_image(path(file)); };
+  std::size_t compared = 0;
+  for (const auto& entry : fs::directory_iterator(path("with/images"))) {
+    const std::string name = entry.path().filename().string();
+    const auto original = read("with/images/" + name);
+    const auto kept = read("without/images/" + name);
+    ASSERT_TRUE(original && kept) << name;
+    EXPECT_LT(cv::norm(*original, *kept, cv::NORM_L1) / static_cast<double>(original->total() * 3), 2.0);
+    ++compared;
+  }
+  EXPECT_GE(compared, 2U);
+
+  const Outcome nerfstudio = run("export out -o scene --format nerfstudio");
+  ASSERT_EQ(nerfstudio.code, 0) << nerfstudio;
+  EXPECT_NE(nerfstudio.err.find("without depth images"), std::string::npos) << nerfstudio;
+  EXPECT_EQ(slurp(path("scene/transforms.json")).find("depth_file_path"), std::string::npos);
+  ASSERT_EQ(run("export out -o page.html").code, 0);
+  EXPECT_NE(slurp(path("page.html")).find("/9j/"), std::string::npos) << "small pictures as base64";
+
+  // Small pictures alone make no model.
+  ASSERT_EQ(run("map elsewhere/robot0 -o small -q --set output.views=").code, 0);
+  fs::rename(path("elsewhere"), path("far"));
+  const Outcome poses = run("export small -o poses --format colmap");
+  ASSERT_EQ(poses.code, 0) << poses;
+  EXPECT_NE(poses.err.find("poses only"), std::string::npos) << poses;
 }
 
 TEST_F(Exports, WrongListsAreToldBeforeTheRun) {

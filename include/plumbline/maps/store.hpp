@@ -20,7 +20,7 @@
 namespace plumbline::maps {
 
 /// Stores of other formats are refused.
-constexpr int kStoreFormat = 10;
+constexpr int kStoreFormat = 11;
 constexpr const char* kStoreFile = "map.db";  ///< in a result folder
 
 /// A robot's refined camera, found while its map grew or when it was finished.
@@ -99,6 +99,13 @@ struct StoreCloud {
   std::shared_ptr<const StoredSurface> surface = nullptr;  ///< of a keyframe's cloud; null: none is kept
 };
 
+/// A keyframe's picture on its way into a store: the bytes of JPEG files.
+struct StorePicture {
+  KeyframeId keyframe;
+  std::vector<std::uint8_t> small;  ///< 160 pixels wide
+  std::vector<std::uint8_t> whole;  ///< rectified to RobotInfo::camera; empty: not kept
+};
+
 /// Additions of a run in one transaction.
 struct StoreStep {
   /// Robot whose own map this is, besides those of others; -1: the map is the only one.
@@ -107,6 +114,7 @@ struct StoreStep {
   std::vector<FramePose> frames;          ///< that came since
   std::vector<std::string> log;           ///< lines that came since
   std::vector<StoreCloud> clouds;
+  std::vector<StorePicture> pictures = {};
   /// All robots, if the camera of one was replaced: keyframes and edges of `map`, which is whole in that
   /// case, were recomputed. Null: no camera changed.
   std::shared_ptr<const std::vector<RobotInfo>> robots = nullptr;
@@ -148,7 +156,8 @@ class StoreWriter {
   core::Result<void> attach(const std::string& name, const std::vector<std::uint8_t>& bytes);
   /// The finished map, in one transaction: poses, landmarks and edges after all optimisation, all frames. It
   /// is the only one then, of the robots that `robots` lists (empty: those of the header). Marks the store as
-  /// complete and leaves one file, as the destructor does. Of `rest`, logs and clouds are added.
+  /// complete and leaves one file, as the destructor does. Of `rest`, logs, clouds and
+  /// pictures are added.
   core::Result<void> save_final(const Map& map, const std::vector<FramePose>& frames,
                                 const ResultFrame& result = {}, const std::vector<StoreStep>& rest = {},
                                 const std::vector<RobotInfo>& robots = {});
@@ -192,6 +201,12 @@ class StoreReader {
   [[nodiscard]] core::Result<std::vector<FrameId>> frame_cloud_ids() const;
   [[nodiscard]] core::Result<cloud::CloudPtr> cloud(FrameId frame) const;
   [[nodiscard]] core::Result<std::vector<std::uint8_t>> cloud_bytes(FrameId frame) const;
+  /// A keyframe's picture of 160 pixels, a JPEG file; empty: none was kept.
+  [[nodiscard]] core::Result<std::vector<std::uint8_t>> small_picture(KeyframeId keyframe) const;
+  /// The whole picture, a JPEG file, rectified to RobotInfo::camera; empty: none was kept.
+  [[nodiscard]] core::Result<std::vector<std::uint8_t>> whole_picture(KeyframeId keyframe) const;
+  /// Keyframes whose whole picture was kept, by id; also such as left the map.
+  [[nodiscard]] core::Result<std::vector<KeyframeId>> whole_picture_ids() const;
   /// Empty if nothing has this name. Errors (kInput): damaged.
   [[nodiscard]] core::Result<std::optional<std::vector<std::uint8_t>>> attachment(
       const std::string& name) const;

@@ -60,6 +60,7 @@ class StoredResult {
   /// The cloud of each keyframe as FOLDER/<number, six digits>.ply; makes the folder. Returns how many.
   /// Errors (kOutput), (kInput): damaged.
   [[nodiscard]] core::Result<std::size_t> write_keyframe_clouds(const std::filesystem::path& folder) const;
+  [[nodiscard]] const StoreReader& reader() const { return *reader_; }
   /// All that have a cloud, their poses in the map's own frame; as long as this lives. Errors (kInput):
   /// damaged.
   [[nodiscard]] core::Result<StoredViews> views() const;

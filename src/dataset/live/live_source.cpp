@@ -17,7 +17,7 @@ namespace {
 
 constexpr const char* kScheme = "ros2://";
 
-/// What all views of one live camera share.
+/// State that all views of one live camera share.
 struct LiveCamera {
   std::string name;
   std::string doubt;
@@ -149,7 +149,7 @@ std::shared_ptr<LiveStream> make_stream(const std::string& address, std::unique_
   return std::make_shared<LiveStream>(std::move(stream), topic(topics.color), topic(topics.depth), how, log);
 }
 
-/// What came while the camera was looked for are the first frames. Error (kInput): none can be made.
+/// Images that came while the camera was looked for make the first frames. Error (kInput): none can be made.
 core::Result<void> begin(const std::string& address, const LiveSurvey& found, const ChosenTopics& topics,
                          const OpenOptions& options, LiveCamera& live) {
   for (const LiveMessage& message : found.images) live.stream->add(message);

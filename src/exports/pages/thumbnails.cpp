@@ -1,49 +1,48 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "pages/thumbnails.hpp"
 
-#include <cmath>
 #include <opencv2/core.hpp>
-#include <opencv2/imgproc.hpp>
 
-#include "pages/jpeg.hpp"
+#include "plumbline/dataset/jpeg.hpp"
 #include "source/pictures.hpp"
 
 namespace plumbline::exports {
 namespace {
 
-constexpr int kThumbnailWidth = 160;
-constexpr std::size_t kThumbnailBytes = 5000;  // bytes
-
-/// As good a JPEG as fits.
-std::string thumbnail(const cv::Mat& bgr) {
-  cv::Mat small;
-  const double scale = static_cast<double>(kThumbnailWidth) / bgr.cols;
-  cv::resize(bgr, small, {kThumbnailWidth, std::max(1, static_cast<int>(std::lround(bgr.rows * scale)))}, 0.0,
-             0.0, cv::INTER_AREA);
-  std::string bytes;
-  for (int quality = 70; quality >= 10; quality -= 15) {
-    bytes = encode_jpeg(small, quality);
-    if (bytes.size() <= kThumbnailBytes) return bytes;
+/// Adds the pictures that the store keeps; true: all are there.
+bool add_stored(const MapSource& source, const std::vector<ExportPose>& poses,
+                std::vector<viewer::Keyframe>& keyframes) {
+  const auto store = source.store("pictures of keyframes");
+  if (!store) return false;
+  bool all = true;
+  for (std::size_t i = 0; i < keyframes.size(); ++i) {
+    if (const auto picture = (*store)->reader().small_picture(poses[i].keyframe))
+      keyframes[i].jpeg.assign(picture->begin(), picture->end());
+    all = all && !keyframes[i].jpeg.empty();
   }
-  return {};
+  return all;
 }
 
 }  // namespace
 
-void add_thumbnails(const MapSource& source, MapView& view) {
-  if (!source.request().open || !source.has_store()) return;
+void add_thumbnails(const MapSource& source, const std::vector<ExportPose>& poses, MapView& view) {
+  std::vector<viewer::Keyframe>& keyframes = view.scene.keyframes;
+  if (!source.has_store() || add_stored(source, poses, keyframes) || !source.request().open) return;
+
   const auto pictures = Pictures::open(source);
   if (!pictures) {
     view.notes.push_back("without pictures of keyframes: " + pictures.error().message);
     return;
   }
 
-  std::vector<viewer::Keyframe>& keyframes = view.scene.keyframes;
   source.executor().parallel_for(keyframes.size(), [&](std::size_t i) {
+    if (!keyframes[i].jpeg.empty()) return;
     const auto frame = pictures->find(keyframes[i].robot, keyframes[i].stamp);
     if (!frame) return;
     const auto picture = pictures->read(keyframes[i].robot, *frame);
-    if (picture && !picture->color.empty()) keyframes[i].jpeg = thumbnail(picture->color);
+    if (!picture) return;
+    const std::vector<std::uint8_t> small = dataset::encode_small_jpeg(picture->color);
+    keyframes[i].jpeg.assign(small.begin(), small.end());
   });
 }
 

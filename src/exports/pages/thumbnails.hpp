@@ -7,8 +7,8 @@
 
 namespace plumbline::exports {
 
-/// Gives the scene's keyframes pictures of 160 pixels' width, 5 kB at most each: those of the map, or of the
+/// Gives the scene's keyframes pictures of 160 pixels' width, 5 kB at most each: the map's, or those of the
 /// recording as far as it can be opened. A note tells of none.
-void add_thumbnails(const MapSource& source, MapView& view);
+void add_thumbnails(const MapSource& source, const std::vector<ExportPose>& poses, MapView& view);
 
 }  // namespace plumbline::exports

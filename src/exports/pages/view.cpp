@@ -183,7 +183,7 @@ core::Result<void> add_keyframes(const MapSource& source, const cloud::CloudFile
     view.scene.keyframes.push_back({pose.robot, pose.stamp, pose.world_from_camera, {}});
   }
 
-  add_thumbnails(source, view);
+  add_thumbnails(source, *poses, view);
   if (!source.has_store()) return {};
 
   auto seen = best_views(source, file, numbers);

@@ -173,7 +173,7 @@ core::Result<void> write_pictures(const MapSource& source, const Pictures& recor
                                   std::vector<Picture>& pictures, const std::filesystem::path& folder,
                                   bool depth, ExportSummary& summary) {
   if (auto made = core::make_folder(folder / "images"); !made) return made;
-  if (depth) {
+  if (depth && !recordings.stored()) {
     if (auto made = core::make_folder(folder / "depth"); !made) return made;
   }
 
@@ -194,7 +194,7 @@ core::Result<void> write_pictures(const MapSource& source, const Pictures& recor
 
       const std::string file = pictures[i].name + ".png";
       written[i] = dataset::write_png(folder / "images" / file, frame->color);
-      if (written[i] && depth)
+      if (written[i] && depth && !recordings.stored())
         written[i] = dataset::write_png(folder / "depth" / file, in_millimetres(frame->depth));
     });
     source.progress(first + count, pictures.size());
@@ -207,6 +207,9 @@ core::Result<void> write_pictures(const MapSource& source, const Pictures& recor
     if (!pictures[i].frame) ++missing;
   }
 
+  if (depth && recordings.stored())
+    summary.notes.push_back(
+        "without depth images: the map keeps colour only; name the recording with --recording");
   if (missing > 0) {
     summary.notes.push_back(
         fmt::format("{} of {} poses have no picture in the recording", missing, pictures.size()));

@@ -33,7 +33,7 @@ void put_intrinsics(const sensor::Pinhole& camera, Json& json) {
   json["h"] = camera.height;
 }
 
-Json transforms_json(const MapSource& source, const std::vector<Picture>& pictures) {
+Json transforms_json(const MapSource& source, const std::vector<Picture>& pictures, bool depth) {
   Json json;
   json["comment"] = source.frame_text() + "; cameras in OpenGL's axes: x right, y up, z backwards";
   json["camera_model"] = "PINHOLE";
@@ -50,7 +50,7 @@ Json transforms_json(const MapSource& source, const std::vector<Picture>& pictur
     pose.col(2) *= -1.0;
     Json frame;
     frame["file_path"] = "images/" + picture.name + ".png";
-    if (picture.frame && source.options().depth) frame["depth_file_path"] = "depth/" + picture.name + ".png";
+    if (picture.frame && depth) frame["depth_file_path"] = "depth/" + picture.name + ".png";
     if (!one_camera) put_intrinsics(pinhole_of(source, picture.pose.robot), frame);
     frame["transform_matrix"] = rows_of(pose, 4);
     json["frames"].push_back(std::move(frame));
@@ -89,13 +89,14 @@ core::Result<ExportSummary> write_nerfstudio(MapSource& source, const std::files
   auto folder = prepare_export(folder_name, source.request().replace);
   if (!folder) return tl::unexpected(folder.error());
 
+  const bool has_depth = source.options().depth && recordings && !recordings->stored();
   auto written = write_start_points(source, *pictures, folder->path() / "points.ply");
   if (written && recordings)
     written = write_pictures(source, *recordings, *pictures, folder->path(), source.options().depth, summary);
 
   if (written)
     written = core::write_file(folder->path() / "transforms.json",
-                               transforms_json(source, *pictures).dump(2) + "\n");
+                               transforms_json(source, *pictures, has_depth).dump(2) + "\n");
 
   if (written)
     written =

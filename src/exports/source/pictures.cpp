@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "plumbline/core/config.hpp"
+#include "plumbline/dataset/jpeg.hpp"
 
 namespace plumbline::exports {
 namespace {
@@ -120,6 +122,33 @@ core::Result<std::vector<ExportPose>> sharpest_near(const MapSource& source,
 }  // namespace
 
 core::Result<Pictures> Pictures::open(const MapSource& source) {
+  auto recordings = open_recordings(source);
+  if (recordings || !source.has_store() || !source.request().recordings.empty()) return recordings;
+  const auto store = source.store("pictures");
+  Pictures stored = open_stored(**store);
+  if (stored.by_robot_.empty()) return recordings;
+  return stored;
+}
+
+Pictures Pictures::open_stored(const maps::StoredResult& store) {
+  Pictures pictures;
+  const auto ids = store.reader().whole_picture_ids();
+  if (!ids) return pictures;
+
+  const maps::Map& map = store.stored().map;
+  for (const core::KeyframeId id : *ids) {
+    if (!map.has_keyframe(id)) continue;
+    pictures.by_robot_[id.robot].stamps.emplace_back(map.keyframe(id).stamp,
+                                                     static_cast<std::size_t>(id.index));
+  }
+
+  for (auto& [robot, recording] : pictures.by_robot_)
+    std::sort(recording.stamps.begin(), recording.stamps.end());
+  pictures.reader_ = &store.reader();
+  return pictures;
+}
+
+core::Result<Pictures> Pictures::open_recordings(const MapSource& source) {
   const auto store = source.store("the cameras of pictures");
   if (!store) return tl::unexpected(store.error());
 
@@ -162,6 +191,17 @@ std::optional<std::size_t> Pictures::find(std::int32_t robot, double stamp) cons
 }
 
 core::Result<sensor::RgbdFrame> Pictures::read(std::int32_t robot, std::size_t frame) const {
+  if (stored()) {
+    const auto bytes = reader_->whole_picture({robot, static_cast<std::int32_t>(frame)});
+    if (!bytes) return tl::unexpected(bytes.error());
+    auto color = dataset::decode_jpeg_bytes(*bytes);
+    if (!color) return tl::unexpected(color.error());
+    sensor::RgbdFrame picture;
+    picture.color = std::move(*color);
+    cv::cvtColor(picture.color, picture.gray, cv::COLOR_BGR2GRAY);
+    return picture;
+  }
+
   const Recording& recording = by_robot_.at(robot);
   return (recording.corrected ? *recording.corrected : *recording.given).read(frame);
 }

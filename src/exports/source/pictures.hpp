@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The pictures that a map was made of, from its recordings.
+// The pictures that a map was made of, from its recordings or its store.
 #include <map>
 #include <memory>
 #include <optional>
@@ -12,25 +12,33 @@
 
 namespace plumbline::exports {
 
-/// One recording for each robot. Frames are rectified with the map's latest version of the camera, into the
-/// pinhole of RobotInfo::camera.
+/// One recording for each robot; of recordings that cannot be opened, the keyframes whose whole pictures the
+/// map's store keeps, without depth. Frames are rectified with the map's latest version of the camera, into
+/// the pinhole of RobotInfo::camera.
 class Pictures {
  public:
-  /// Opens the request's recordings, or else those the map was made from. Errors (kInput): they are gone or
-  /// not known.
+  /// Opens the request's recordings, or else those the map was made from, or else the store's pictures, as
+  /// long as the source lives. Errors (kInput): there are none of these.
   static core::Result<Pictures> open(const MapSource& source);
 
   /// Number of the frame with this stamp in the robot's recording; none: it has none.
   [[nodiscard]] std::optional<std::size_t> find(std::int32_t robot, double stamp) const;
+  /// The store's pictures have colour only. Errors (kInput): cannot be read.
   [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::int32_t robot, std::size_t frame) const;
+  /// True if the pictures are of the store: there is no depth.
+  [[nodiscard]] bool stored() const { return reader_ != nullptr; }
 
  private:
+  static core::Result<Pictures> open_recordings(const MapSource& source);
+  static Pictures open_stored(const maps::StoredResult& store);
+
   struct Recording {
     std::unique_ptr<dataset::FrameSource> given;
     std::unique_ptr<dataset::FrameSource> corrected;  ///< null: `given` is right
     std::vector<std::pair<double, std::size_t>> stamps;
   };
-  std::map<std::int32_t, Recording> by_robot_;
+  std::map<std::int32_t, Recording> by_robot_;  ///< of stored pictures, only the stamps
+  const maps::StoreReader* reader_ = nullptr;   ///< null: recordings are read
 };
 
 /// A picture of a model: its camera, pose and name.

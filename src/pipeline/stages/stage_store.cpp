@@ -7,13 +7,20 @@
 #include <vector>
 
 #include "plumbline/core/version.hpp"
+#include "plumbline/dataset/jpeg.hpp"
 #include "plumbline/maps/fusion_state.hpp"
 #include "plumbline/maps/store.hpp"
+#include "plumbline/maps/stored_maps.hpp"
+#include "plumbline/pipeline/robot_recordings.hpp"
 #include "results/resumed_run.hpp"
 #include "stages/stages.hpp"
 
 namespace plumbline::pipeline {
 namespace {
+
+/// Pictures of keyframes that are kept.
+enum class Images { kAuto, kSmall, kWhole, kOff };
+constexpr int kWholeQuality = 95;  // of JPEG files: no loss that an eye or a matcher finds
 
 class StoreStage : public Stage {
  public:
@@ -21,6 +28,14 @@ class StoreStage : public Stage {
     table.boolean(
         "enabled", enabled_,
         "Write map.db, the map with its clouds, during the run, so that an interrupted run can be continued");
+    table.choice<Images>(
+        "images", images_,
+        {{"auto", Images::kAuto},
+         {"small", Images::kSmall},
+         {"whole", Images::kWhole},
+         {"off", Images::kOff}},
+        "Pictures of keyframes in map.db: 160 pixels wide, or whole as well; auto: whole for "
+        "live cameras, whose pictures are kept nowhere else");
   }
   [[nodiscard]] std::vector<std::string> files() const override {
     return enabled_ ? std::vector<std::string>{maps::kStoreFile} : std::vector<std::string>{};
@@ -29,6 +44,10 @@ class StoreStage : public Stage {
 
   core::Result<void> start(const RunContext& context) override {
     if (!enabled_) return {};
+    context_ = &context;
+    const RobotRecordings* recordings = context.input.recordings;
+    whole_ = images_ == Images::kWhole ||
+             (images_ == Images::kAuto && recordings != nullptr && recordings->live());
     if (context.resumed != nullptr) return take(maps::StoreWriter::resume(context.resumed->store));
     maps::StoreHeader header;
     header.robots = *context.input.robots;
@@ -58,7 +77,11 @@ class StoreStage : public Stage {
       step.robot = track->robot;
       step.log.push_back(to_line(track->row));
       if (track->pose) step.frames.push_back(*track->pose);
-      if (track->keyframe.valid()) return add(std::exchange(step, {}), *track, std::move(clouds));
+      if (track->keyframe.valid()) {
+        if (const auto frame = io.input<sensor::RgbdFrame>("frame"))
+          add_picture(track->keyframe, frame->color, step.pictures);
+        return add(std::exchange(step, {}), *track, std::move(clouds));
+      }
     }
     return clouds.empty() ? core::Result<void>() : writer_->add_cloud(clouds.front());
   }
@@ -75,6 +98,9 @@ class StoreStage : public Stage {
     }
     std::vector<maps::StoreStep> rest;
     for (auto& [robot, step] : steps_) rest.push_back(std::move(step));
+    rest.emplace_back();
+    rest.back().pictures =
+        context_->input.stored_maps != nullptr ? stored_pictures() : corrected_pictures(*map);
     auto saved = map->apart.empty()
                      ? writer_->save_final(*map->map, map->frame_poses, frame, rest, map->robots)
                      : writer_->save_final(with_components(*map), frames_with_components(*map), frame, rest,
@@ -101,6 +127,47 @@ class StoreStage : public Stage {
     return writer_->add(step);
   }
 
+  void add_picture(core::KeyframeId keyframe, const cv::Mat& color,
+                   std::vector<maps::StorePicture>& pictures) const {
+    if (images_ == Images::kOff || color.empty()) return;
+    maps::StorePicture picture{keyframe, dataset::encode_small_jpeg(color), {}};
+    if (whole_) picture.whole = dataset::encode_jpeg(color, kWholeQuality);
+    pictures.push_back(std::move(picture));
+  }
+
+  /// Whole pictures of keyframes that were rectified with an earlier version of their camera, again.
+  [[nodiscard]] std::vector<maps::StorePicture> corrected_pictures(const MapResult& map) const {
+    std::vector<maps::StorePicture> pictures;
+    if (!whole_ || context_->input.recordings == nullptr) return pictures;
+    for (const RobotInfo& robot : map.robots) {
+      if (robot.versions.empty()) continue;
+      const maps::CameraVersion& newest = robot.versions.back();
+      const auto source = context_->input.recordings->taken_by(robot.number, newest.camera);
+      if (source == nullptr) continue;
+      for (const core::KeyframeId id : map.map->keyframe_ids()) {
+        if (id.robot != robot.number || id.index >= newest.first_keyframe) continue;
+        const auto frame = source->read(static_cast<std::size_t>(map.map->keyframe(id).frame_index));
+        if (frame) add_picture(id, frame->color, pictures);
+      }
+    }
+    return pictures;
+  }
+
+  /// Pictures of the stores that finished maps were read from.
+  [[nodiscard]] std::vector<maps::StorePicture> stored_pictures() const {
+    std::vector<maps::StorePicture> pictures;
+    if (images_ == Images::kOff) return pictures;
+    for (const maps::StoredCloud& cloud : context_->input.stored_maps->clouds()) {
+      if (!cloud.id.valid()) continue;
+      const maps::StoreReader& reader = *context_->input.stored_maps->parts()[cloud.part].reader;
+      const core::KeyframeId stored{cloud.stored_robot, cloud.id.index};
+      const auto small = reader.small_picture(stored);
+      const auto whole = reader.whole_picture(stored);
+      if (small && whole && !small->empty()) pictures.push_back({cloud.id, *small, *whole});
+    }
+    return pictures;
+  }
+
   /// All components as one map; each keeps its own frame, given by its tree.
   static maps::Map with_components(const MapResult& map) {
     std::vector<const maps::Map*> all{map.map.get()};
@@ -121,6 +188,9 @@ class StoreStage : public Stage {
   }
 
   bool enabled_ = true;
+  Images images_ = Images::kAuto;
+  bool whole_ = false;  ///< whole pictures are kept
+  const RunContext* context_ = nullptr;
   std::optional<maps::StoreWriter> writer_;
   std::map<std::int32_t, maps::StoreStep> steps_;  ///< since each robot's last keyframe
 };
@@ -132,6 +202,7 @@ StageType store_stage() {
       "store", "Writes the maps to map.db during the run, one transaction per keyframe", Mode::kSerial,
       {{"track", track_port(), false},
        {"cloud", keyframe_cloud_port(), false},
+       {"frame", frame_port(), false},
        {"map", map_port()},
        {"result", cloud_port(), false}},
       {}, true);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Coarse surfaces of keyframes in the store, and stores that were made before there
+// Coarse surfaces and pictures of keyframes in the store, and stores that were made before there
 // were any.
 #include <gtest/gtest.h>
 #include <sqlite3.h>
@@ -55,6 +55,38 @@ std::vector<KeyframeId> write_store(const std::filesystem::path& file, StoreWorl
     EXPECT_TRUE(writer->add(step));
   }
   return ids;
+}
+
+TEST(StorePictures, ComeBackAndTheLastOneCounts) {
+  const StoreFolder folder;
+  StoreWorld world(6);
+  auto writer = StoreWriter::create(folder.file(), header_of(world.camera));
+  ASSERT_TRUE(writer);
+  StoreStep first;
+  const KeyframeId a = world.step();
+  const MapRevision moment = world.map.now();
+  first.map = std::make_shared<MapChanges>(world.map.changes_since({}));
+  first.pictures = {{a, {1, 2, 3}, {}}};
+  ASSERT_TRUE(writer->add(first));
+
+  StoreStep second;
+  const KeyframeId b = world.step();
+  second.map = std::make_shared<MapChanges>(world.map.changes_since(moment));
+  second.pictures = {{b, {4, 5}, {6, 7, 8}}};
+  ASSERT_TRUE(writer->add(second));
+  StoreStep rest;
+  rest.pictures = {{b, {4, 5}, {9}}};
+  ASSERT_TRUE(writer->save_final(world.map, {}, {}, {rest}));
+
+  const auto reader = StoreReader::open(folder.file());
+  ASSERT_TRUE(reader);
+  using Bytes = std::vector<std::uint8_t>;
+  EXPECT_EQ(reader->small_picture(a).value(), (Bytes{1, 2, 3}));
+  EXPECT_EQ(reader->whole_picture(a).value(), Bytes{});
+  EXPECT_EQ(reader->small_picture(b).value(), (Bytes{4, 5}));
+  EXPECT_EQ(reader->whole_picture(b).value(), Bytes{9});
+  EXPECT_EQ(reader->whole_picture_ids().value(), std::vector<KeyframeId>{b});
+  EXPECT_EQ(reader->small_picture({0, 99}).value(), Bytes{}) << "there is no such keyframe";
 }
 
 TEST(StoreSurface, ComesBackRoundedLessThanWhatIsMeasured) {

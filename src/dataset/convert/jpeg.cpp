@@ -1,14 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "pages/jpeg.hpp"
+#include "plumbline/dataset/jpeg.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <csetjmp>
 #include <cstdio>  // jpeglib.h uses FILE and size_t without including them
 #include <cstdlib>
 // clang-format off
 #include <jpeglib.h>
 // clang-format on
+#include <opencv2/imgproc.hpp>
 
-namespace plumbline::exports {
+#include "image_decoders.hpp"
+
+namespace plumbline::dataset {
 namespace {
 
 struct JpegErrors {
@@ -22,7 +27,7 @@ struct JpegErrors {
 
 }  // namespace
 
-std::string encode_jpeg(const cv::Mat& bgr, int quality) {
+std::vector<std::uint8_t> encode_jpeg(const cv::Mat& bgr, int quality) {
   if (bgr.type() != CV_8UC3 || bgr.empty()) return {};
   jpeg_compress_struct info;
   JpegErrors errors;
@@ -46,6 +51,8 @@ std::string encode_jpeg(const cv::Mat& bgr, int quality) {
   jpeg_set_defaults(&info);
   jpeg_set_quality(&info, quality, TRUE);
   info.optimize_coding = TRUE;
+  constexpr int kFine = 90;  // from here on colour is as sharp as brightness
+  if (quality >= kFine) info.comp_info[0].h_samp_factor = info.comp_info[0].v_samp_factor = 1;
 
   jpeg_start_compress(&info, TRUE);
   while (info.next_scanline < info.image_height) {
@@ -55,9 +62,33 @@ std::string encode_jpeg(const cv::Mat& bgr, int quality) {
   jpeg_finish_compress(&info);
   jpeg_destroy_compress(&info);
 
-  std::string out(reinterpret_cast<const char*>(bytes), size);
+  std::vector<std::uint8_t> out(bytes, bytes + size);
   std::free(bytes);
   return out;
 }
 
-}  // namespace plumbline::exports
+std::vector<std::uint8_t> encode_small_jpeg(const cv::Mat& bgr) {
+  constexpr int kWidth = 160;
+  constexpr std::size_t kMostBytes = 5000;
+  if (bgr.empty()) return {};
+
+  cv::Mat small;
+  const double scale = static_cast<double>(kWidth) / bgr.cols;
+  const int height = std::max(1, static_cast<int>(std::lround(bgr.rows * scale)));
+  cv::resize(bgr, small, {kWidth, height}, 0.0, 0.0, cv::INTER_AREA);
+
+  for (int quality = 70; quality >= 10; quality -= 15) {
+    std::vector<std::uint8_t> bytes = encode_jpeg(small, quality);
+    if (bytes.size() <= kMostBytes) return bytes;
+  }
+  return {};
+}
+
+core::Result<cv::Mat> decode_jpeg_bytes(const std::vector<std::uint8_t>& file) {
+  if (!is_jpeg(file)) return core::input_error("is no JPEG file");
+  auto decoded = decode_jpeg(file);
+  if (!decoded) return core::input_error(decoded.error());
+  return std::move(*decoded);
+}
+
+}  // namespace plumbline::dataset
