@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "example.hpp"
-#include "plumbline/cloud/cloud_io.hpp"
-#include "plumbline/cloud/filter_chain.hpp"
-#include "plumbline/cloud/keyframe_cloud.hpp"
+#include "plumbline/cloud/filters/filter_chain.hpp"
+#include "plumbline/cloud/fusion/keyframe_cloud.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/pipeline/input.hpp"
 
 using namespace plumbline;

@@ -8,8 +8,8 @@
 #include <cstdio>
 
 #include "example.hpp"
-#include "plumbline/cloud/keyframe_cloud.hpp"
-#include "plumbline/cloud/voxel_map.hpp"
+#include "plumbline/cloud/fusion/keyframe_cloud.hpp"
+#include "plumbline/cloud/fusion/voxel_map.hpp"
 #include "plumbline/pipeline/input.hpp"
 #include "plumbline/viz/snapshot.hpp"
 

@@ -14,9 +14,9 @@
 #include <optional>
 
 #include "example.hpp"
-#include "plumbline/cloud/constrained_point_to_plane.hpp"
-#include "plumbline/cloud/keyframe_cloud.hpp"
-#include "plumbline/cloud/two_way_correspondences.hpp"
+#include "plumbline/cloud/fusion/keyframe_cloud.hpp"
+#include "plumbline/cloud/registration/constrained_point_to_plane.hpp"
+#include "plumbline/cloud/registration/two_way_correspondences.hpp"
 #include "plumbline/pipeline/input.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 

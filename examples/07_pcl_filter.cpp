@@ -13,9 +13,9 @@
 #include <cstdio>
 #include <memory>
 
-#include "plumbline/cloud/flying_pixels.hpp"
-#include "plumbline/cloud/incidence_angle.hpp"
-#include "plumbline/cloud/normal_consistency.hpp"
+#include "plumbline/cloud/filters/flying_pixels.hpp"
+#include "plumbline/cloud/filters/incidence_angle.hpp"
+#include "plumbline/cloud/filters/normal_consistency.hpp"
 
 using namespace plumbline;
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/maps/line_export.hpp"
 
-#include "plumbline/cloud/ply.hpp"
+#include "plumbline/cloud/io/ply.hpp"
 #include "plumbline/maps/map.hpp"
 
 namespace plumbline::maps {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <memory>
 
-#include "plumbline/cloud/filter_plugin.hpp"
+#include "plumbline/cloud/filters/filter_plugin.hpp"
 
 namespace {
 

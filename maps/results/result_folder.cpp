@@ -7,7 +7,7 @@
 #include <array>
 #include <system_error>
 
-#include "plumbline/cloud/ply.hpp"
+#include "plumbline/cloud/io/ply.hpp"
 #include "plumbline/maps/output_folder.hpp"
 
 namespace plumbline::maps {

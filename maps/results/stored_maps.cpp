@@ -10,7 +10,7 @@
 #include <system_error>
 #include <utility>
 
-#include "plumbline/cloud/compact_cloud.hpp"
+#include "plumbline/cloud/compact/compact_cloud.hpp"
 #include "plumbline/maps/map_join.hpp"
 
 namespace plumbline::maps {

@@ -8,7 +8,7 @@
 #include <system_error>
 #include <utility>
 
-#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/cloud/transform.hpp"
 #include "plumbline/core/config.hpp"
 #include "plumbline/maps/components.hpp"

@@ -7,7 +7,7 @@
 #include <set>
 #include <utility>
 
-#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
 #include "plumbline/cloud/transform.hpp"
 #include "plumbline/core/output_file.hpp"

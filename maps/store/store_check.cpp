@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "plumbline/cloud/compact_cloud.hpp"
+#include "plumbline/cloud/compact/compact_cloud.hpp"
 
 namespace plumbline::maps {
 namespace {

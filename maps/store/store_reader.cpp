@@ -6,7 +6,7 @@
 #include <map>
 #include <utility>
 
-#include "plumbline/cloud/compact_cloud.hpp"
+#include "plumbline/cloud/compact/compact_cloud.hpp"
 #include "store/map_rows.hpp"
 #include "store/store_schema.hpp"
 

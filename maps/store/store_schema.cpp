@@ -73,6 +73,7 @@ void put_robots(Database& database, std::int64_t transaction, const std::vector<
 
 void put_camera_versions(Database& database, std::int64_t transaction, const std::vector<RobotInfo>& robots) {
   std::vector<CameraVersions> versions;
+  versions.reserve(robots.size());
   for (const RobotInfo& robot : robots) versions.push_back({robot.number, robot.versions});
   put_header(database, transaction, "cameras", pack(encoded(versions)));
 }

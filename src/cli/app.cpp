@@ -11,9 +11,9 @@
 #include <utility>
 
 #include "paths.hpp"
-#include "plumbline/cloud/filter_plugin.hpp"
-#include "signals.hpp"
-#include "version_text.hpp"
+#include "plumbline/cloud/filters/filter_plugin.hpp"
+#include "terminal/signals.hpp"
+#include "terminal/version_text.hpp"
 
 namespace plumbline::cli {
 namespace {

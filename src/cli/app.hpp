@@ -9,13 +9,13 @@
 #include <string>
 #include <vector>
 
-#include "console.hpp"
-#include "plumbline/cloud/filter.hpp"
+#include "plumbline/cloud/filters/filter.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/executor.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/net/ros2.hpp"
 #include "plumbline/pipeline/map_recording.hpp"
+#include "terminal/console.hpp"
 
 namespace plumbline::cli {
 

@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "plumbline/cloud/ply.hpp"
+#include "plumbline/cloud/io/ply.hpp"
 #include "plumbline/core/numbers.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/viz/color.hpp"

@@ -2,7 +2,7 @@
 // Live cameras as the input of a command.
 #include "app.hpp"
 #include "plumbline/net/ros2.hpp"
-#include "signals.hpp"
+#include "terminal/signals.hpp"
 
 namespace plumbline::cli {
 

@@ -2,10 +2,10 @@
 #include <optional>
 #include <utility>
 
+#include "films/video_frames.hpp"
 #include "frame_images.hpp"
 #include "layout.hpp"
 #include "plumbline/sensor/rectify.hpp"
-#include "video_frames.hpp"
 
 namespace plumbline::dataset {
 namespace {

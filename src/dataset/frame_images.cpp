@@ -8,11 +8,11 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "azure_kinect.hpp"
+#include "films/azure_kinect.hpp"
+#include "films/video_frames.hpp"
 #include "layout.hpp"
 #include "plumbline/core/numbers.hpp"
 #include "plumbline/dataset/image_io.hpp"
-#include "video_frames.hpp"
 
 namespace plumbline::dataset {
 namespace {

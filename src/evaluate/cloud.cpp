@@ -11,11 +11,11 @@
 #include <utility>
 
 #include "icp.hpp"
-#include "measured_surface.hpp"
 #include "plumbline/evaluate/trajectory.hpp"
 #include "plumbline/geometry/alignment.hpp"
-#include "point_index.hpp"
 #include "prepare.hpp"
+#include "surfaces/measured_surface.hpp"
+#include "surfaces/point_index.hpp"
 
 namespace plumbline::evaluate {
 namespace {

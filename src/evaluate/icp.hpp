@@ -4,9 +4,9 @@
 // Trimmed point-to-plane ICP of a cloud onto a surface (Chen and Medioni 1991; Chetverikov et al. 2002).
 #include <vector>
 
-#include "measured_surface.hpp"
 #include "plumbline/core/executor.hpp"
 #include "plumbline/geometry/rigid3.hpp"
+#include "surfaces/measured_surface.hpp"
 
 namespace plumbline::evaluate {
 

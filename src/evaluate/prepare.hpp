@@ -9,7 +9,7 @@
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/executor.hpp"
 #include "plumbline/evaluate/cloud.hpp"
-#include "point_index.hpp"
+#include "surfaces/point_index.hpp"
 
 namespace plumbline::evaluate {
 

@@ -15,7 +15,7 @@
 #include "layers.hpp"
 #include "plumbline/core/random.hpp"
 #include "plumbline/evaluate/statistics.hpp"
-#include "point_index.hpp"
+#include "surfaces/point_index.hpp"
 
 namespace plumbline::evaluate {
 namespace {

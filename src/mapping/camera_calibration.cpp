@@ -13,7 +13,7 @@
 
 #include "plumbline/features/measurement.hpp"
 #include "plumbline/geometry/velocity.hpp"
-#include "plumbline/mapping/observation_noise.hpp"
+#include "plumbline/mapping/adjustment/observation_noise.hpp"
 #include "plumbline/maps/components.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "plumbline/features/measurement.hpp"
-#include "plumbline/mapping/relocalisation_check.hpp"
+#include "plumbline/mapping/loop_closing/relocalisation_check.hpp"
 #include "plumbline/maps/components.hpp"
 
 namespace plumbline::mapping {

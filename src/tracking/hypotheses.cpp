@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "frame_aligner.hpp"
-#include "photometric_view.hpp"
+#include "alignment/frame_aligner.hpp"
+#include "alignment/photometric_view.hpp"
 #include "plumbline/tracking/thumbnail_alignment.hpp"
 
 namespace plumbline::tracking {

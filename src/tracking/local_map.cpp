@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "plumbline/cloud/cell_map.hpp"
+#include "plumbline/cloud/fusion/cell_map.hpp"
 #include "plumbline/maps/components.hpp"
 
 namespace plumbline::tracking {

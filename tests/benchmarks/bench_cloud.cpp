@@ -7,9 +7,9 @@
 
 #include <random>
 
-#include "plumbline/cloud/filter_chain.hpp"
-#include "plumbline/cloud/keyframe_cloud.hpp"
-#include "plumbline/cloud/voxel_map.hpp"
+#include "plumbline/cloud/filters/filter_chain.hpp"
+#include "plumbline/cloud/fusion/keyframe_cloud.hpp"
+#include "plumbline/cloud/fusion/voxel_map.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 
 namespace {

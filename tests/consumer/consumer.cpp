@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <memory>
 
-#include "plumbline/cloud/cloud_io.hpp"
-#include "plumbline/cloud/filter_chain.hpp"
+#include "plumbline/cloud/filters/filter_chain.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/core/version.hpp"
 #include "plumbline/viz/snapshot.hpp"
 

@@ -6,7 +6,7 @@
 #include <pcl/point_types.h>
 
 #include "fuzz_target.hpp"
-#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 
 namespace plumbline::fuzz {
 

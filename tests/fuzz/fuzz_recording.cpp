@@ -2,9 +2,9 @@
 // What recordings hold beside images: calibrations of Azure Kinects, arrays of NumPy.
 #include <cmath>
 
-#include "azure_kinect.hpp"
+#include "films/azure_kinect.hpp"
 #include "fuzz_target.hpp"
-#include "image_decoders.hpp"
+#include "images/image_decoders.hpp"
 
 using namespace plumbline;
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The YAML loader, and a filter chain made of what it read.
 #include "fuzz_target.hpp"
-#include "plumbline/cloud/filter_chain.hpp"
+#include "plumbline/cloud/filters/filter_chain.hpp"
 #include "plumbline/core/config.hpp"
 
 using namespace plumbline;

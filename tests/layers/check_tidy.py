@@ -10,6 +10,7 @@ the ones with most changes. Without the tool, or outside a git checkout, the exi
 """
 import json
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -42,15 +43,22 @@ def check_format(root):
     return 1 if wrong or not files else 0
 
 
+def now(name):
+    """The name of a file today: git says FOLDER/{OLD => NEW}/FILE of one that was moved."""
+    moved = re.sub(r"\{.* => (.*)\}", r"\1", name)
+    return (moved.split(" => ")[1] if " => " in moved else moved).replace("//", "/")
+
+
 def changed_sources(root):
     """Sources of the product that differ from the base, most changes first; None outside git."""
     base = os.environ.get("PLUMBLINE_BASE", "HEAD~1")
-    lines = git(root, "diff", "--numstat", "--no-renames", base, "--", "src", "maps", "viz")
+    # A file that was only moved, or whose includes were, has not changed.
+    lines = git(root, "diff", "--numstat", "-M", "-I^#include", base, "--", "src", "maps", "viz")
     if lines is None:
         return None
     changes = [line.split("\t") for line in lines]
-    sources = [(int(added) + int(removed), name) for added, removed, name in changes
-               if name.endswith(".cpp") and (root / name).exists()]
+    sources = [(int(added) + int(removed), now(name)) for added, removed, name in changes if added + removed != "00"]
+    sources = [(count, name) for count, name in sources if name.endswith(".cpp") and (root / name).exists()]
     return [name for _, name in sorted(sources, reverse=True)]
 
 

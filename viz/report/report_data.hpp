@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/evaluate/trajectory.hpp"
 #include "plumbline/geometry/trajectory.hpp"

@@ -10,7 +10,7 @@
 #include <limits>
 #include <optional>
 
-#include "plumbline/cloud/cell_map.hpp"
+#include "plumbline/cloud/fusion/cell_map.hpp"
 #include "plumbline/core/numbers.hpp"
 
 namespace plumbline::viz {

@@ -7,7 +7,7 @@
 #include <array>
 #include <cmath>
 
-#include "plumbline/cloud/floor.hpp"
+#include "plumbline/cloud/fusion/floor.hpp"
 #include "scene/view_frame.hpp"
 
 namespace plumbline::viz {

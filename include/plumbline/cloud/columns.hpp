@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/cloud/types.hpp"
 
 namespace plumbline::cloud {

@@ -7,7 +7,7 @@
 #include <map>
 #include <vector>
 
-#include "plumbline/mapping/map_fusion.hpp"
+#include "plumbline/mapping/merging/map_fusion.hpp"
 
 namespace plumbline::mapping {
 

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/geometry/trajectory.hpp"
 #include "plumbline/maps/line_export.hpp"

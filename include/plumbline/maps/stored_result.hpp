@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "plumbline/cloud/dense_fusion.hpp"
-#include "plumbline/cloud/filter_chain.hpp"
+#include "plumbline/cloud/filters/filter_chain.hpp"
+#include "plumbline/cloud/fusion/dense_fusion.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/executor.hpp"
 #include "plumbline/maps/result_folder.hpp"

@@ -9,13 +9,13 @@
 #include <string>
 #include <vector>
 
-#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/cloud/types.hpp"
 #include "plumbline/core/ids.hpp"
 #include "plumbline/features/frame_features.hpp"
 #include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/geometry/trajectory.hpp"
-#include "plumbline/mapping/global_adjustment.hpp"
+#include "plumbline/mapping/adjustment/global_adjustment.hpp"
 #include "plumbline/maps/frame_pose.hpp"
 #include "plumbline/maps/fusion_state.hpp"
 #include "plumbline/maps/line_export.hpp"

@@ -14,7 +14,7 @@
 #include "plumbline/core/stop.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/dataset/live_frames.hpp"
-#include "plumbline/mapping/other_maps.hpp"
+#include "plumbline/mapping/merging/other_maps.hpp"
 #include "plumbline/pipeline/run.hpp"
 #include "plumbline/pipeline/summary.hpp"
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "plumbline/core/log.hpp"
-#include "plumbline/mapping/merge_server.hpp"
+#include "plumbline/mapping/merging/merge_server.hpp"
 #include "plumbline/viz/scene.hpp"
 
 namespace plumbline::pipeline {

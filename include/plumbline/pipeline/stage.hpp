@@ -20,7 +20,7 @@
 #include <utility>
 #include <vector>
 
-#include "plumbline/cloud/filter.hpp"
+#include "plumbline/cloud/filters/filter.hpp"
 #include "plumbline/core/config.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/executor.hpp"

@@ -8,7 +8,7 @@
 #include "app.hpp"
 #include "plumbline/dataset/convert.hpp"
 #include "plumbline/pipeline/input.hpp"
-#include "signals.hpp"
+#include "terminal/signals.hpp"
 
 namespace plumbline::cli {
 namespace {

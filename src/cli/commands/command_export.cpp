@@ -10,7 +10,7 @@
 #include "plumbline/exports/export.hpp"
 #include "plumbline/maps/stored_result.hpp"
 #include "recording_opener.hpp"
-#include "silenced_stdio.hpp"
+#include "terminal/silenced_stdio.hpp"
 
 namespace plumbline::cli {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "app.hpp"
 #include "plumbline/cloud/columns.hpp"
-#include "plumbline/cloud/filter_chain.hpp"
+#include "plumbline/cloud/filters/filter_chain.hpp"
 
 namespace plumbline::cli {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "app.hpp"
 #include "plumbline/pipeline/fuse_maps.hpp"
-#include "signals.hpp"
+#include "terminal/signals.hpp"
 
 namespace plumbline::cli {
 namespace {

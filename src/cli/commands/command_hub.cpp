@@ -7,7 +7,7 @@
 #include "network_options.hpp"
 #include "plumbline/net/hub.hpp"
 #include "plumbline/pipeline/map_recording.hpp"
-#include "signals.hpp"
+#include "terminal/signals.hpp"
 
 namespace plumbline::cli {
 namespace {

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "app.hpp"
-#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/dataset/bag.hpp"
 #include "plumbline/dataset/live.hpp"
 #include "plumbline/dataset/recording_poses.hpp"
@@ -24,7 +24,7 @@
 #include "plumbline/net/ros2.hpp"
 #include "plumbline/pipeline/input.hpp"
 #include "plumbline/synth/source.hpp"
-#include "signals.hpp"
+#include "terminal/signals.hpp"
 
 namespace plumbline::cli {
 namespace {

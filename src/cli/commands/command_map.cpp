@@ -10,7 +10,7 @@
 #include "app.hpp"
 #include "live_page.hpp"
 #include "plumbline/pipeline/map_recording.hpp"
-#include "signals.hpp"
+#include "terminal/signals.hpp"
 
 namespace plumbline::cli {
 namespace {

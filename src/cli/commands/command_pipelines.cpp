@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "app.hpp"
-#include "plumbline/cloud/filter_schema.hpp"
+#include "plumbline/cloud/filters/filter_schema.hpp"
 #include "plumbline/core/option_schema.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/pipeline/graph.hpp"

@@ -9,7 +9,7 @@
 #include "plumbline/dataset/play.hpp"
 #include "plumbline/net/ros2.hpp"
 #include "plumbline/pipeline/input.hpp"
-#include "signals.hpp"
+#include "terminal/signals.hpp"
 
 namespace plumbline::cli {
 namespace {

@@ -8,7 +8,7 @@
 #include "app.hpp"
 #include "network_options.hpp"
 #include "plumbline/net/robot.hpp"
-#include "signals.hpp"
+#include "terminal/signals.hpp"
 
 namespace plumbline::cli {
 namespace {

@@ -9,7 +9,7 @@
 #include "option_flags.hpp"
 #include "plumbline/synth/recording.hpp"
 #include "plumbline/synth/scene.hpp"
-#include "signals.hpp"
+#include "terminal/signals.hpp"
 
 namespace plumbline::cli {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // "PLCC", version, then one zstd frame with checksum: head, rays of a grid, and columns of bytes. Each column
 // holds differences to the point before, low bytes and high bytes apart, which is what zstd packs best.
-#include "plumbline/cloud/compact_cloud.hpp"
+#include "plumbline/cloud/compact/compact_cloud.hpp"
 
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "filters/filter_tools.hpp"
-#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 
 namespace plumbline::cloud {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "filters/filter_tools.hpp"
-#include "plumbline/cloud/flying_pixels.hpp"
+#include "plumbline/cloud/filters/flying_pixels.hpp"
 
 namespace plumbline::cloud {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "filters/filter_tools.hpp"
-#include "plumbline/cloud/incidence_angle.hpp"
+#include "plumbline/cloud/filters/incidence_angle.hpp"
 
 namespace plumbline::cloud {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "filters/filter_tools.hpp"
-#include "plumbline/cloud/normal_consistency.hpp"
+#include "plumbline/cloud/filters/normal_consistency.hpp"
 
 namespace plumbline::cloud {
 namespace {

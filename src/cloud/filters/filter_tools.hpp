@@ -10,7 +10,7 @@
 #include <limits>
 
 #include "finite.hpp"
-#include "plumbline/cloud/filter.hpp"
+#include "plumbline/cloud/filters/filter.hpp"
 
 namespace plumbline::cloud {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/cloud/dense_fusion.hpp"
+#include "plumbline/cloud/fusion/dense_fusion.hpp"
 
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
@@ -10,10 +10,10 @@
 #include <utility>
 
 #include "fusion/fusion_tiles.hpp"
-#include "plumbline/cloud/exposure.hpp"
-#include "plumbline/cloud/free_space.hpp"
+#include "plumbline/cloud/fusion/exposure.hpp"
+#include "plumbline/cloud/fusion/free_space.hpp"
+#include "plumbline/cloud/fusion/surfels.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
-#include "plumbline/cloud/surfels.hpp"
 
 namespace plumbline::cloud {
 namespace {

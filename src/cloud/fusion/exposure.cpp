@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/cloud/exposure.hpp"
+#include "plumbline/cloud/fusion/exposure.hpp"
 
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
@@ -7,7 +7,7 @@
 #include <algorithm>
 
 #include "io/scalar.hpp"
-#include "plumbline/cloud/cell_map.hpp"
+#include "plumbline/cloud/fusion/cell_map.hpp"
 
 namespace plumbline::cloud {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/cloud/floor.hpp"
+#include "plumbline/cloud/fusion/floor.hpp"
 
 #include <pcl/filters/voxel_grid.h>
 #include <pcl/point_cloud.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/cloud/free_space.hpp"
+#include "plumbline/cloud/fusion/free_space.hpp"
 
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "plumbline/cloud/cell_map.hpp"
+#include "plumbline/cloud/fusion/cell_map.hpp"
 
 namespace plumbline::cloud {
 namespace {

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "plumbline/cloud/exposure.hpp"
+#include "plumbline/cloud/fusion/exposure.hpp"
 
 namespace plumbline::cloud {
 

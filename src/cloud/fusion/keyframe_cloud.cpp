@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/cloud/keyframe_cloud.hpp"
+#include "plumbline/cloud/fusion/keyframe_cloud.hpp"
 
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/cloud/surfels.hpp"
+#include "plumbline/cloud/fusion/surfels.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/cloud/voxel_map.hpp"
+#include "plumbline/cloud/fusion/voxel_map.hpp"
 
 #include <pcl/point_cloud.h>
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "io/cloud_table.hpp"
-#include "plumbline/cloud/ply.hpp"
+#include "plumbline/cloud/io/ply.hpp"
 
 namespace plumbline::cloud {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 
 namespace plumbline::cloud {
 

@@ -11,7 +11,7 @@
 
 #include "finite.hpp"
 #include "io/shift.hpp"
-#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/core/output_file.hpp"
 
 namespace plumbline::cloud {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/cloud/mesh.hpp"
+#include "plumbline/cloud/io/mesh.hpp"
 
 #include <fmt/format.h>
 #include <pcl/common/io.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/cloud/constrained_point_to_plane.hpp"
+#include "plumbline/cloud/registration/constrained_point_to_plane.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/cloud/surface_cloud.hpp"
+#include "plumbline/cloud/registration/surface_cloud.hpp"
 
 #include <pcl/filters/voxel_grid.h>
 
@@ -9,7 +9,7 @@
 #include <map>
 #include <vector>
 
-#include "plumbline/cloud/cell_map.hpp"
+#include "plumbline/cloud/fusion/cell_map.hpp"
 
 namespace plumbline::cloud {
 namespace {

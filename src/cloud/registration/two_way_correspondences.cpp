@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/cloud/two_way_correspondences.hpp"
+#include "plumbline/cloud/registration/two_way_correspondences.hpp"
 
 #include <pcl/common/point_tests.h>
 

@@ -10,7 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "bags/rvl.hpp"
-#include "image_decoders.hpp"
+#include "images/image_decoders.hpp"
 
 namespace plumbline::dataset {
 namespace {

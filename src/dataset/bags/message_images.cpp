@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "bags/images.hpp"
-#include "image_decoders.hpp"
+#include "images/image_decoders.hpp"
 
 namespace plumbline::dataset {
 

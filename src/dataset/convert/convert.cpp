@@ -8,7 +8,7 @@
 #include <system_error>
 
 #include "convert/copy_target.hpp"
-#include "image_decoders.hpp"
+#include "images/image_decoders.hpp"
 #include "layout.hpp"
 
 namespace plumbline::dataset {

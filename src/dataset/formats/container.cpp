@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "container.hpp"
+#include "films/container.hpp"
 
 #include <memory>
 

@@ -2,7 +2,7 @@
 #pragma once
 
 // OpenEXR images, which OpenCV's decoder has switched off unless the environment says otherwise.
-#include "image_decoders.hpp"
+#include "images/image_decoders.hpp"
 
 namespace plumbline::dataset {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "image_formats.hpp"
+#include "images/image_formats.hpp"
 
 #include <opencv2/imgcodecs.hpp>
 

@@ -2,7 +2,7 @@
 #include <memory>
 #include <opencv2/videoio.hpp>
 
-#include "video_frames.hpp"
+#include "films/video_frames.hpp"
 
 namespace plumbline::dataset {
 namespace {

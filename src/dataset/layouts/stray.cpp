@@ -4,9 +4,9 @@
 // camera_matrix.csv for the video.
 #include <fmt/format.h>
 
+#include "films/video_frames.hpp"
 #include "layout.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
-#include "video_frames.hpp"
 
 namespace plumbline::dataset {
 namespace {

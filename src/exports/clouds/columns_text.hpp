@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/core/output_file.hpp"
 
 namespace plumbline::exports {

@@ -11,7 +11,7 @@
 #include <limits>
 
 #include "formats.hpp"
-#include "plumbline/cloud/dense_fusion.hpp"
+#include "plumbline/cloud/fusion/dense_fusion.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/core/version.hpp"
 #include "source/georeference.hpp"

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "formats.hpp"
-#include "plumbline/cloud/mesh.hpp"
+#include "plumbline/cloud/io/mesh.hpp"
 
 namespace plumbline::exports {
 namespace {

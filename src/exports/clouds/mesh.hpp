@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "plumbline/cloud/ply.hpp"
+#include "plumbline/cloud/io/ply.hpp"
 #include "source/map_source.hpp"
 
 namespace plumbline::exports {

@@ -7,7 +7,7 @@
 
 #include "formats.hpp"
 #include "paths/robot_files.hpp"
-#include "plumbline/cloud/ply.hpp"
+#include "plumbline/cloud/io/ply.hpp"
 
 namespace plumbline::exports {
 namespace {

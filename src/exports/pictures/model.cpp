@@ -33,7 +33,7 @@ class ColorCells {
     int count = 0;
     for (int reach = 0; reach <= 1 && count == 0; ++reach) {
       for (int i = 0; i < 27; ++i) {
-        const Eigen::Vector3d step(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+        const Eigen::Vector3d step = Eigen::Vector3i(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1).cast<double>();
         if (reach == 0 && !step.isZero()) continue;
         const auto found = cells_.find(key_of(place + kCell_m * step));
         if (found == cells_.end()) continue;

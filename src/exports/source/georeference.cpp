@@ -10,7 +10,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/core/output_file.hpp"
 
 namespace plumbline::exports {

@@ -14,8 +14,8 @@
 #include <system_error>
 
 #include "plumbline/cloud/columns.hpp"
-#include "plumbline/cloud/dense_fusion.hpp"
-#include "plumbline/cloud/floor.hpp"
+#include "plumbline/cloud/fusion/dense_fusion.hpp"
+#include "plumbline/cloud/fusion/floor.hpp"
 #include "plumbline/cloud/transform.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/maps/frame_pose.hpp"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/exports/export.hpp"
 #include "plumbline/maps/stored_result.hpp"
 #include "plumbline/maps/stored_views.hpp"

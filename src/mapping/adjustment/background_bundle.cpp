@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/background_bundle.hpp"
+#include "plumbline/mapping/adjustment/background_bundle.hpp"
 
 #include <chrono>
 #include <utility>

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/global_adjustment.hpp"
+#include "plumbline/mapping/adjustment/global_adjustment.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "plumbline/geometry/adjoint.hpp"
 #include "plumbline/geometry/plucker.hpp"
-#include "plumbline/mapping/map_bundle.hpp"
+#include "plumbline/mapping/adjustment/map_bundle.hpp"
 #include "plumbline/optimize/pose_covariances.hpp"
 
 namespace plumbline::mapping {

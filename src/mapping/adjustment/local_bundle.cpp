@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/local_bundle.hpp"
+#include "plumbline/mapping/adjustment/local_bundle.hpp"
 
 #include <algorithm>
 #include <map>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/map_bundle.hpp"
+#include "plumbline/mapping/adjustment/map_bundle.hpp"
 
 #include "plumbline/geometry/plucker.hpp"
 

@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "plumbline/geometry/adjoint.hpp"
-#include "plumbline/mapping/global_adjustment.hpp"
+#include "plumbline/mapping/adjustment/global_adjustment.hpp"
 
 namespace plumbline::mapping {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/map_recalibration.hpp"
+#include "plumbline/mapping/adjustment/map_recalibration.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/observation_noise.hpp"
+#include "plumbline/mapping/adjustment/observation_noise.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/refinement.hpp"
+#include "plumbline/mapping/adjustment/refinement.hpp"
 
 #include <fmt/format.h>
 

@@ -6,8 +6,8 @@
 
 #include "plumbline/features/photometric.hpp"
 #include "plumbline/geometry/velocity.hpp"
-#include "plumbline/mapping/map_recalibration.hpp"
-#include "plumbline/mapping/surface_edge.hpp"
+#include "plumbline/mapping/adjustment/map_recalibration.hpp"
+#include "plumbline/mapping/registration/surface_edge.hpp"
 
 namespace plumbline::mapping {
 namespace {

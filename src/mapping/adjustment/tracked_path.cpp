@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/tracked_path.hpp"
+#include "plumbline/mapping/adjustment/tracked_path.hpp"
 
 #include <fmt/format.h>
 

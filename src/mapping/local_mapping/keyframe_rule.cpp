@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/keyframe_rule.hpp"
+#include "plumbline/mapping/local_mapping/keyframe_rule.hpp"
 
 #include <algorithm>
 #include <cmath>

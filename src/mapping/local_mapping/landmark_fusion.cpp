@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/landmark_fusion.hpp"
+#include "plumbline/mapping/local_mapping/landmark_fusion.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "plumbline/mapping/landmark_fusion.hpp"
+#include "plumbline/mapping/local_mapping/landmark_fusion.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 
 namespace plumbline::mapping {

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "plumbline/geometry/line_triangulation.hpp"
-#include "plumbline/mapping/landmark_triangulation.hpp"
+#include "plumbline/mapping/local_mapping/landmark_triangulation.hpp"
 
 namespace plumbline::mapping {
 namespace {

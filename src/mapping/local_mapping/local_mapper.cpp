@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/local_mapper.hpp"
+#include "plumbline/mapping/local_mapping/local_mapper.hpp"
 
 #include <algorithm>
 #include <utility>
 
 #include "plumbline/features/depth_delay.hpp"
-#include "plumbline/mapping/landmark_normal.hpp"
+#include "plumbline/mapping/local_mapping/landmark_normal.hpp"
 
 namespace plumbline::mapping {
 namespace {

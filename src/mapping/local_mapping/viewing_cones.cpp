@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/viewing_cones.hpp"
+#include "plumbline/mapping/local_mapping/viewing_cones.hpp"
 
 #include <algorithm>
 #include <cmath>

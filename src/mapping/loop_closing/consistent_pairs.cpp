@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/consistent_pairs.hpp"
+#include "plumbline/mapping/loop_closing/consistent_pairs.hpp"
 
 #include <algorithm>
 #include <numeric>

@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "plumbline/mapping/loop_closer.hpp"
+#include "plumbline/mapping/loop_closing/loop_closer.hpp"
 
 namespace plumbline::mapping {
 

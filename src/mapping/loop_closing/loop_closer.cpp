@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/loop_closer.hpp"
+#include "plumbline/mapping/loop_closing/loop_closer.hpp"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "loop_closing/inter_robot_loops.hpp"
-#include "plumbline/mapping/relocalisation_check.hpp"
+#include "plumbline/mapping/loop_closing/relocalisation_check.hpp"
 #include "plumbline/maps/components.hpp"
 
 namespace plumbline::mapping {

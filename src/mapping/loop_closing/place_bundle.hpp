@@ -4,8 +4,8 @@
 // Bundle adjustment of R, t and the structure that two keyframes have in common (METHOD section 6).
 #include <vector>
 
-#include "plumbline/mapping/observation_noise.hpp"
-#include "plumbline/mapping/place_verification.hpp"
+#include "plumbline/mapping/adjustment/observation_noise.hpp"
+#include "plumbline/mapping/loop_closing/place_verification.hpp"
 #include "plumbline/tracking/association.hpp"
 
 namespace plumbline::mapping {

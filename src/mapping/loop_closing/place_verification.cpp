@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/place_verification.hpp"
+#include "plumbline/mapping/loop_closing/place_verification.hpp"
 
 #include <fmt/format.h>
 
@@ -15,7 +15,7 @@
 #include "loop_closing/place_pose.hpp"
 #include "loop_closing/place_surface.hpp"
 #include "plumbline/features/line_match.hpp"
-#include "plumbline/mapping/local_map_alignment.hpp"
+#include "plumbline/mapping/registration/local_map_alignment.hpp"
 #include "plumbline/optimize/pose_solver.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 #include "plumbline/tracking/association.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/relocalisation_check.hpp"
+#include "plumbline/mapping/loop_closing/relocalisation_check.hpp"
 
 #include <utility>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/component_joiner.hpp"
+#include "plumbline/mapping/merging/component_joiner.hpp"
 
 #include <algorithm>
 

@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "plumbline/mapping/map_fusion.hpp"
+#include "plumbline/mapping/merging/map_fusion.hpp"
 
 namespace plumbline::mapping {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "plumbline/cloud/cell_map.hpp"
+#include "plumbline/cloud/fusion/cell_map.hpp"
 #include "plumbline/features/descriptor.hpp"
 #include "plumbline/geometry/rigid3.hpp"
 

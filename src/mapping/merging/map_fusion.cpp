@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/map_fusion.hpp"
+#include "plumbline/mapping/merging/map_fusion.hpp"
 
 #include <fmt/format.h>
 

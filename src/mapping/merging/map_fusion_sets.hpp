@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "plumbline/core/executor.hpp"
-#include "plumbline/mapping/consistent_pairs.hpp"
-#include "plumbline/mapping/map_fusion.hpp"
+#include "plumbline/mapping/loop_closing/consistent_pairs.hpp"
+#include "plumbline/mapping/merging/map_fusion.hpp"
 
 namespace plumbline::mapping {
 

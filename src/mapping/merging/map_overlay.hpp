@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "plumbline/mapping/map_fusion.hpp"
+#include "plumbline/mapping/merging/map_fusion.hpp"
 
 namespace plumbline::mapping {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/merge_server.hpp"
+#include "plumbline/mapping/merging/merge_server.hpp"
 
 #include <algorithm>
 #include <set>

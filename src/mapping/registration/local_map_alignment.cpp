@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Point-to-plane ICP of two surfaces, both ways at once, in PCL's registration loop.
-#include "plumbline/mapping/local_map_alignment.hpp"
+#include "plumbline/mapping/registration/local_map_alignment.hpp"
 
 #include <fmt/format.h>
 #include <pcl/registration/icp.h>
@@ -10,9 +10,9 @@
 #include <cmath>
 #include <optional>
 
-#include "plumbline/cloud/cell_map.hpp"
-#include "plumbline/cloud/constrained_point_to_plane.hpp"
-#include "plumbline/cloud/two_way_correspondences.hpp"
+#include "plumbline/cloud/fusion/cell_map.hpp"
+#include "plumbline/cloud/registration/constrained_point_to_plane.hpp"
+#include "plumbline/cloud/registration/two_way_correspondences.hpp"
 
 namespace plumbline::mapping {
 namespace {

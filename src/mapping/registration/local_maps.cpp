@@ -7,10 +7,10 @@
 #include <cmath>
 #include <utility>
 
-#include "plumbline/cloud/cell_map.hpp"
+#include "plumbline/cloud/fusion/cell_map.hpp"
+#include "plumbline/cloud/registration/surface_cloud.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
-#include "plumbline/cloud/surface_cloud.hpp"
-#include "plumbline/mapping/local_map_alignment.hpp"
+#include "plumbline/mapping/registration/local_map_alignment.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 
 namespace plumbline::mapping {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/surface_edge_job.hpp"
+#include "plumbline/mapping/registration/surface_edge_job.hpp"
 
 #include <utility>
 

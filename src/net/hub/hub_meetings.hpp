@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "bus.hpp"
-#include "plumbline/mapping/merge_server.hpp"
+#include "plumbline/mapping/merging/merge_server.hpp"
 #include "plumbline/maps/store_replica.hpp"
 #include "plumbline/pipeline/meeting_log.hpp"
 

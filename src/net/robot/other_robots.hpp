@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "bus.hpp"
-#include "plumbline/mapping/other_maps.hpp"
+#include "plumbline/mapping/merging/other_maps.hpp"
 #include "plumbline/maps/store_replica.hpp"
 
 namespace plumbline::net {

@@ -2,7 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "graph/export_entry.hpp"
-#include "plumbline/cloud/filter_schema.hpp"
+#include "plumbline/cloud/filters/filter_schema.hpp"
 #include "plumbline/core/option_schema.hpp"
 #include "plumbline/pipeline/reference.hpp"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "plumbline/cloud/filter_chain.hpp"
+#include "plumbline/cloud/filters/filter_chain.hpp"
 #include "plumbline/pipeline/stage.hpp"
 
 namespace plumbline::pipeline {

@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "plumbline/cloud/compact_cloud.hpp"
+#include "plumbline/cloud/compact/compact_cloud.hpp"
 
 namespace plumbline::pipeline {
 

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <optional>
 
-#include "plumbline/cloud/floor.hpp"
+#include "plumbline/cloud/fusion/floor.hpp"
 #include "plumbline/viz/snapshot.hpp"
 
 namespace plumbline::pipeline {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "plumbline/core/log.hpp"
-#include "plumbline/mapping/map_fusion.hpp"
+#include "plumbline/mapping/merging/map_fusion.hpp"
 #include "plumbline/pipeline/data.hpp"
 #include "summary/sections.hpp"
 

@@ -9,12 +9,12 @@
 #include <vector>
 
 #include "options/chain_option.hpp"
-#include "plumbline/cloud/compact_cloud.hpp"
-#include "plumbline/cloud/free_space.hpp"
-#include "plumbline/cloud/keyframe_cloud.hpp"
+#include "plumbline/cloud/compact/compact_cloud.hpp"
+#include "plumbline/cloud/fusion/free_space.hpp"
+#include "plumbline/cloud/fusion/keyframe_cloud.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
 #include "plumbline/dataset/frame_source.hpp"
-#include "plumbline/mapping/local_map_alignment.hpp"
+#include "plumbline/mapping/registration/local_map_alignment.hpp"
 #include "plumbline/pipeline/observer.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "stages/stages.hpp"

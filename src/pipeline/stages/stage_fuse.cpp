@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "options/chain_option.hpp"
-#include "plumbline/cloud/cloud_io.hpp"
-#include "plumbline/cloud/dense_fusion.hpp"
+#include "plumbline/cloud/fusion/dense_fusion.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/cloud/transform.hpp"
 #include "plumbline/maps/fusion_state.hpp"
 #include "plumbline/maps/stored_maps.hpp"

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "plumbline/mapping/evident.hpp"
-#include "plumbline/mapping/merge_server.hpp"
+#include "plumbline/mapping/merging/merge_server.hpp"
 #include "plumbline/maps/stored_maps.hpp"
 #include "plumbline/pipeline/meeting_log.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"

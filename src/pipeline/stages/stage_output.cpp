@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "options/exports_option.hpp"
-#include "plumbline/cloud/cloud_io.hpp"
-#include "plumbline/cloud/dense_fusion.hpp"
+#include "plumbline/cloud/fusion/dense_fusion.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"

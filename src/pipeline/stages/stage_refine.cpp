@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "plumbline/mapping/refinement.hpp"
+#include "plumbline/mapping/adjustment/refinement.hpp"
 #include "plumbline/maps/camera_history.hpp"
 #include "results/resumed_run.hpp"
 #include "stages/stages.hpp"

@@ -9,6 +9,7 @@
 #include "plumbline/core/version.hpp"
 #include "plumbline/dataset/jpeg.hpp"
 #include "plumbline/maps/fusion_state.hpp"
+#include "plumbline/maps/map_join.hpp"
 #include "plumbline/maps/store.hpp"
 #include "plumbline/maps/stored_maps.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"

@@ -2,7 +2,7 @@
 // Taps of tracking results and of results at the end of a run.
 #include <fmt/format.h>
 
-#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/maps/result_folder.hpp"

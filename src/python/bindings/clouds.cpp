@@ -9,8 +9,8 @@
 
 #include "background.hpp"
 #include "bindings.hpp"
-#include "plumbline/cloud/cloud_io.hpp"
-#include "plumbline/cloud/filter_chain.hpp"
+#include "plumbline/cloud/filters/filter_chain.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/core/config.hpp"
 #include "plumbline/core/executor.hpp"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Shared objects that are no plugins for this program; which one is said on the compiler's command line.
-#include "plumbline/cloud/filter_plugin.hpp"
+#include "plumbline/cloud/filters/filter_plugin.hpp"
 
 using plumbline::cloud::FilterPlugin;
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
-#include "plumbline/cloud/filter_chain.hpp"
-#include "plumbline/cloud/keyframe_cloud.hpp"
+#include "plumbline/cloud/filters/filter_chain.hpp"
+#include "plumbline/cloud/fusion/keyframe_cloud.hpp"
 #include "test_cloud_worlds.hpp"
 
 namespace plumbline::cloud {

@@ -6,8 +6,8 @@
 #include <limits>
 #include <random>
 
-#include "plumbline/cloud/compact_cloud.hpp"
-#include "plumbline/cloud/keyframe_cloud.hpp"
+#include "plumbline/cloud/compact/compact_cloud.hpp"
+#include "plumbline/cloud/fusion/keyframe_cloud.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
 #include "test_cloud_worlds.hpp"
 

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "plumbline/cloud/keyframe_cloud.hpp"
+#include "plumbline/cloud/fusion/keyframe_cloud.hpp"
 #include "test_cloud_filter_run.hpp"
 
 namespace plumbline::cloud {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "plumbline/cloud/cloud_io.hpp"
-#include "plumbline/cloud/filter_chain.hpp"
+#include "plumbline/cloud/filters/filter_chain.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "test_cloud_worlds.hpp"
 
 namespace plumbline::cloud::worlds {

@@ -5,8 +5,8 @@
 #include <cstring>
 #include <set>
 
-#include "plumbline/cloud/cloud_io.hpp"
-#include "plumbline/cloud/keyframe_cloud.hpp"
+#include "plumbline/cloud/fusion/keyframe_cloud.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "test_cloud_filter_run.hpp"
 
 namespace plumbline::cloud {

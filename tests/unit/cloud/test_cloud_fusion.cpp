@@ -5,11 +5,11 @@
 #include <array>
 #include <cmath>
 
-#include "plumbline/cloud/compact_cloud.hpp"
-#include "plumbline/cloud/dense_fusion.hpp"
-#include "plumbline/cloud/exposure.hpp"
-#include "plumbline/cloud/free_space.hpp"
-#include "plumbline/cloud/keyframe_cloud.hpp"
+#include "plumbline/cloud/compact/compact_cloud.hpp"
+#include "plumbline/cloud/fusion/dense_fusion.hpp"
+#include "plumbline/cloud/fusion/exposure.hpp"
+#include "plumbline/cloud/fusion/free_space.hpp"
+#include "plumbline/cloud/fusion/keyframe_cloud.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 #include "test_cloud_worlds.hpp"

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <tuple>
 
-#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "test_cloud_worlds.hpp"
 
 namespace plumbline::cloud {

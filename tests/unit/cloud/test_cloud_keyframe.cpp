@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "plumbline/cloud/keyframe_cloud.hpp"
+#include "plumbline/cloud/fusion/keyframe_cloud.hpp"
 #include "test_cloud_worlds.hpp"
 
 namespace plumbline::cloud {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "plumbline/cloud/mesh.hpp"
+#include "plumbline/cloud/io/mesh.hpp"
 #include "test_cloud_worlds.hpp"
 
 namespace plumbline::cloud {

@@ -9,9 +9,9 @@
 #include <memory>
 #include <numeric>
 
-#include "plumbline/cloud/flying_pixels.hpp"
-#include "plumbline/cloud/incidence_angle.hpp"
-#include "plumbline/cloud/normal_consistency.hpp"
+#include "plumbline/cloud/filters/flying_pixels.hpp"
+#include "plumbline/cloud/filters/incidence_angle.hpp"
+#include "plumbline/cloud/filters/normal_consistency.hpp"
 
 namespace plumbline::cloud {
 namespace {

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "plumbline/cloud/ply.hpp"
+#include "plumbline/cloud/io/ply.hpp"
 #include "plumbline/core/output_file.hpp"
 
 namespace plumbline::cloud {

@@ -5,8 +5,8 @@
 
 #include <limits>
 
-#include "plumbline/cloud/constrained_point_to_plane.hpp"
-#include "plumbline/cloud/two_way_correspondences.hpp"
+#include "plumbline/cloud/registration/constrained_point_to_plane.hpp"
+#include "plumbline/cloud/registration/two_way_correspondences.hpp"
 #include "random_world.hpp"
 
 namespace plumbline::cloud {

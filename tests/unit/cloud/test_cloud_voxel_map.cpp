@@ -3,7 +3,7 @@
 
 #include <cstring>
 
-#include "plumbline/cloud/voxel_map.hpp"
+#include "plumbline/cloud/fusion/voxel_map.hpp"
 #include "test_cloud_worlds.hpp"
 
 namespace plumbline::cloud {

@@ -13,7 +13,7 @@
 #include <iterator>
 #include <string>
 
-#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/exports/export.hpp"
 
 namespace plumbline::exports {

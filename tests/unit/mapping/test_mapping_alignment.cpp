@@ -10,7 +10,7 @@
 #include <limits>
 #include <map>
 
-#include "plumbline/mapping/local_map_alignment.hpp"
+#include "plumbline/mapping/registration/local_map_alignment.hpp"
 #include "random_world.hpp"
 
 namespace plumbline::mapping {

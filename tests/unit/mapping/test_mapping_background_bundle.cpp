@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include "plumbline/mapping/background_bundle.hpp"
+#include "plumbline/mapping/adjustment/background_bundle.hpp"
 #include "random_world.hpp"
 
 namespace plumbline::mapping {

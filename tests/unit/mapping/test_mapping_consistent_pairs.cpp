@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "plumbline/mapping/consistent_pairs.hpp"
+#include "plumbline/mapping/loop_closing/consistent_pairs.hpp"
 #include "random_world.hpp"
 
 namespace plumbline::mapping {

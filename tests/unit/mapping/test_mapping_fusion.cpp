@@ -2,7 +2,7 @@
 // Maps of two robots become one where they overlap, and stay two where they do not.
 #include <gtest/gtest.h>
 
-#include "plumbline/mapping/map_fusion.hpp"
+#include "plumbline/mapping/merging/map_fusion.hpp"
 #include "poster_view.hpp"
 
 namespace plumbline::mapping {

@@ -6,7 +6,7 @@
 
 #include "../../../src/mapping/merging/free_direction.hpp"
 #include "../../../src/mapping/merging/map_overlay.hpp"
-#include "plumbline/mapping/map_fusion.hpp"
+#include "plumbline/mapping/merging/map_fusion.hpp"
 #include "poster_view.hpp"
 
 namespace plumbline::mapping {

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <memory>
 
-#include "plumbline/mapping/global_adjustment.hpp"
+#include "plumbline/mapping/adjustment/global_adjustment.hpp"
 #include "random_world.hpp"
 
 namespace plumbline::mapping {

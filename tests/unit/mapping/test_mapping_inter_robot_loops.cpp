@@ -2,7 +2,7 @@
 // A robot whose path has drifted learns of it by way of another robot's map of the two ends.
 #include <gtest/gtest.h>
 
-#include "plumbline/mapping/loop_closer.hpp"
+#include "plumbline/mapping/loop_closing/loop_closer.hpp"
 #include "plumbline/maps/map_join.hpp"
 #include "poster_view.hpp"
 

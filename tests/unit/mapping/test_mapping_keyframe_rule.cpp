@@ -4,7 +4,7 @@
 #include <cmath>
 #include <memory>
 
-#include "plumbline/mapping/keyframe_rule.hpp"
+#include "plumbline/mapping/local_mapping/keyframe_rule.hpp"
 
 namespace plumbline::mapping {
 namespace {

@@ -3,10 +3,10 @@
 #include <gtest/gtest.h>
 
 #include "landmark_world.hpp"
-#include "plumbline/mapping/landmark_culling.hpp"
-#include "plumbline/mapping/landmark_fusion.hpp"
-#include "plumbline/mapping/landmark_normal.hpp"
-#include "plumbline/mapping/landmark_triangulation.hpp"
+#include "plumbline/mapping/local_mapping/landmark_culling.hpp"
+#include "plumbline/mapping/local_mapping/landmark_fusion.hpp"
+#include "plumbline/mapping/local_mapping/landmark_normal.hpp"
+#include "plumbline/mapping/local_mapping/landmark_triangulation.hpp"
 #include "two_views_of_a_wall.hpp"
 
 namespace plumbline::mapping {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <memory>
 
-#include "plumbline/mapping/local_bundle.hpp"
+#include "plumbline/mapping/adjustment/local_bundle.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 #include "random_world.hpp"
 

@@ -2,7 +2,7 @@
 // What looks the same is not closed when it lies further off than drift, or when two places look it.
 #include <gtest/gtest.h>
 
-#include "plumbline/mapping/loop_closer.hpp"
+#include "plumbline/mapping/loop_closing/loop_closer.hpp"
 #include "poster_view.hpp"
 
 namespace plumbline::mapping {

@@ -2,8 +2,8 @@
 // Places are verified, and only those that are the same; loops that are wrong do no harm.
 #include <gtest/gtest.h>
 
-#include "plumbline/mapping/loop_closer.hpp"
-#include "plumbline/mapping/map_fusion.hpp"
+#include "plumbline/mapping/loop_closing/loop_closer.hpp"
+#include "plumbline/mapping/merging/map_fusion.hpp"
 #include "poster_view.hpp"
 
 namespace plumbline::mapping {

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "landmark_world.hpp"
-#include "plumbline/mapping/map_recalibration.hpp"
+#include "plumbline/mapping/adjustment/map_recalibration.hpp"
 
 namespace plumbline::mapping {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "plumbline/mapping/merge_server.hpp"
+#include "plumbline/mapping/merging/merge_server.hpp"
 #include "poster_view.hpp"
 
 namespace plumbline::mapping {

@@ -7,8 +7,8 @@
 #include <random>
 #include <vector>
 
-#include "plumbline/mapping/local_mapper.hpp"
-#include "plumbline/mapping/surface_edge.hpp"
+#include "plumbline/mapping/local_mapping/local_mapper.hpp"
+#include "plumbline/mapping/registration/surface_edge.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 #include "plumbline/tracking/surface_sampler.hpp"
 

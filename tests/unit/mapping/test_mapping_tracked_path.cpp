@@ -7,9 +7,9 @@
 #include <memory>
 #include <set>
 
-#include "plumbline/mapping/global_adjustment.hpp"
-#include "plumbline/mapping/local_bundle.hpp"
-#include "plumbline/mapping/tracked_path.hpp"
+#include "plumbline/mapping/adjustment/global_adjustment.hpp"
+#include "plumbline/mapping/adjustment/local_bundle.hpp"
+#include "plumbline/mapping/adjustment/tracked_path.hpp"
 #include "random_world.hpp"
 
 namespace plumbline::mapping {

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "plumbline/mapping/viewing_cones.hpp"
+#include "plumbline/mapping/local_mapping/viewing_cones.hpp"
 
 namespace plumbline::mapping {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "plumbline/cloud/ply.hpp"
+#include "plumbline/cloud/io/ply.hpp"
 #include "plumbline/maps/line_export.hpp"
 
 namespace plumbline::maps {

@@ -10,7 +10,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "plumbline/cloud/compact_cloud.hpp"
+#include "plumbline/cloud/compact/compact_cloud.hpp"
 #include "plumbline/maps/store.hpp"
 #include "store_folder.hpp"
 #include "store_world.hpp"

@@ -8,7 +8,7 @@
 #include <limits>
 #include <random>
 
-#include "plumbline/cloud/compact_cloud.hpp"
+#include "plumbline/cloud/compact/compact_cloud.hpp"
 #include "plumbline/maps/store.hpp"
 #include "plumbline/maps/store_replica.hpp"
 #include "store_dump.hpp"

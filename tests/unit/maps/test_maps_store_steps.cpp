@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "plumbline/cloud/compact_cloud.hpp"
+#include "plumbline/cloud/compact/compact_cloud.hpp"
 #include "plumbline/maps/store.hpp"
 #include "store_folder.hpp"
 #include "store_world.hpp"

@@ -8,7 +8,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "plumbline/cloud/filter_chain.hpp"
+#include "plumbline/cloud/filters/filter_chain.hpp"
 #include "plumbline/pipeline/graph.hpp"
 
 namespace plumbline::pipeline {

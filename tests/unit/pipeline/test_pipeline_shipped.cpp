@@ -9,7 +9,7 @@
 #include <sstream>
 
 #include "../../../src/pipeline/graph/option_levels.hpp"
-#include "plumbline/cloud/filter_chain.hpp"
+#include "plumbline/cloud/filters/filter_chain.hpp"
 #include "plumbline/pipeline/graph.hpp"
 #include "plumbline/pipeline/reference.hpp"
 #include "plumbline/sensor/camera_file.hpp"

@@ -9,9 +9,9 @@
 
 #include "bags/part/binary_file.hpp"
 #include "bags/part/compression.hpp"
-#include "bags/part/db3.hpp"
-#include "bags/part/mcap.hpp"
-#include "bags/part/ros1_bag.hpp"
+#include "bags/part/formats/db3.hpp"
+#include "bags/part/formats/mcap.hpp"
+#include "bags/part/formats/ros1_bag.hpp"
 
 namespace plumbline::dataset {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bags/bag_parts.hpp"
 #include "bags/part/cdr.hpp"
-#include "bags/part/mcap_writer.hpp"
+#include "bags/part/formats/mcap_writer.hpp"
 #include "bags/part/open_bag.hpp"
 #include "bags/part/ros1_messages.hpp"
 

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Rebuilds a map for another camera than the one its keyframes were read with: features follow from their
+// measurements, and only surfaces are read in the keyframes' pictures again (docs/method/calibration.md).
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "plumbline/core/executor.hpp"
+#include "plumbline/mapping/adjustment/global_adjustment.hpp"
+#include "plumbline/mapping/local_mapping/landmark_fusion.hpp"
+#include "plumbline/maps/frame_pose.hpp"
+#include "plumbline/maps/map.hpp"
+#include "plumbline/sensor/frame.hpp"
+#include "plumbline/sensor/recalibration.hpp"
+#include "plumbline/tracking/surface_sampler.hpp"
+
+namespace plumbline::mapping {
+
+/// Changes the map of one robot, and the poses of its frames relative to keyframes, from the camera that was
+/// believed before to the one believed now: features, surfaces, edges and the tracker's own steps become what
+/// that camera measured, keyframes and landmarks go to where these put them.
+void recalibrate_map(const sensor::Recalibration& change, maps::Map& map,
+                     std::vector<maps::FramePose>& frames);
+
+/// A keyframe's picture again, by its number in the recording, as the camera believed now took it; none: it
+/// cannot be read. Called from several threads at a time.
+using PictureReader = std::function<std::optional<sensor::RgbdFrame>(std::int64_t frame_index)>;
+
+struct SurfaceMeasurement {
+  tracking::SurfaceSamplerOptions sampler;
+  double min_overlap = 0.25;  ///< SurfaceEdgeOptions
+  bool photometric = true;    ///< grey values, too
+};
+
+/// Measures surfaces of keyframes and the edges between them again, in the pictures themselves. What cannot
+/// be read or aligned again stays as recalibrate_map left it.
+void measure_surfaces_again(const sensor::Pinhole& camera, const std::vector<maps::FramePose>& frames,
+                            const PictureReader& read, const SurfaceMeasurement& how,
+                            const core::Executor& executor, maps::Map& map);
+
+/// Landmarks are searched in all keyframes that should see them, because a wrong camera made the tracker
+/// reject some; then the whole map is adjusted.
+GlobalAdjustmentSummary adjust_recalibrated_map(const sensor::Pinhole& camera, const FusionOptions& fusion,
+                                                const GlobalAdjustmentOptions& adjustment, maps::Map& map);
+
+}  // namespace plumbline::mapping

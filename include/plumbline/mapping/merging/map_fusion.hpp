@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Maps of several robots become one (docs/method/merging.md; Algorithm 2). Each map has a world frame of its
+// own. Places that two maps share are found by the appearance of keyframes, verified one by one, and believed
+// only if enough of them agree on the relative pose of the two worlds, the aligned maps fit, and no other
+// alignment is as good.
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "plumbline/core/executor.hpp"
+#include "plumbline/core/options.hpp"
+#include "plumbline/mapping/adjustment/global_adjustment.hpp"
+#include "plumbline/mapping/local_mapping/landmark_fusion.hpp"
+#include "plumbline/mapping/loop_closing/consistent_pairs.hpp"
+#include "plumbline/mapping/loop_closing/place_verification.hpp"
+#include "plumbline/maps/map.hpp"
+#include "plumbline/maps/map_join.hpp"
+#include "plumbline/places/recogniser.hpp"
+
+namespace plumbline::mapping {
+
+struct MapFusionOptions {
+  int min_pairs = 5;  ///< keyframes of each map that must agree
+  /// Exception for short overlaps: `few_pairs` keyframes suffice if they share `few_inliers` points and lines
+  /// (lines count twice), if surfaces hold in all directions or both maps extend over `few_extent_m` in a
+  /// free one, and if nothing supports another alignment.
+  int few_pairs = 2;
+  int few_inliers = 100;
+  double few_extent_m = 3.0;
+  double min_span_m = 0.25;   ///< smallest distance between agreeing keyframes; or
+  double min_span_rad = 0.5;  ///< smallest rotation between them
+  ConsistencyOptions consistency;
+  /// Keyframes of a second answer, relative to those of the best one, from which it is a doubt.
+  double alternative = 0.1;
+  /// Matching landmarks of another answer, relative to the best one's, from which it is a doubt.
+  double alternative_share = 0.06;
+  double max_seen_through = 0.06;  ///< share of landmarks seen through above which such an answer is refuted
+  double min_confirmed = 0.5;    ///< share of the keyframes with a view of the other map that must confirm it
+  int verifications = 250;       ///< pairs of keyframes that are verified for each two maps, at most
+  bool robust = true;            ///< the pose graph may reject pairs
+  bool merge_duplicates = true;  ///< merge duplicate landmarks; a preview does not
+  std::uint64_t seed = 1;
+  places::VocabularyOptions vocabulary;
+  places::RecogniserOptions places;
+  VerificationOptions verify;
+  FusionOptions doubles;
+  GlobalAdjustmentOptions adjustment;
+  MapFusionOptions();
+  void declare(core::OptionTable& table);
+  /// Only what decides whether maps are merged.
+  void declare_decision(core::OptionTable& table, const std::string& prefix = "");
+};
+
+/// A map in its own world frame; its robots' numbers differ from those of all other parts. Must outlive the
+/// functions it is passed to.
+struct MapPart {
+  const maps::Map* map = nullptr;
+  Cameras cameras;  ///< of its robots
+};
+
+/// Two keyframes of different parts that show the same place.
+struct VerifiedPair {
+  core::KeyframeId query;
+  core::KeyframeId match;
+  PlaceVerification evidence;
+};
+
+/// One map laid over another: landmarks of either one, at their place in the other.
+struct OverlayFit {
+  int expected = 0;  ///< landmarks where the other map measured a surface, from a similar side and distance
+  int matched = 0;   ///< of these, landmarks that the other map has too
+  int contradicted = 0;  ///< landmarks where the other map saw through
+  double chance = 0.0;   ///< expected matches with any other landmarks of that density
+  /// Share of the expected landmarks that match, beyond chance.
+  [[nodiscard]] double share() const {
+    return expected > 0 ? std::max(0.0, matched - chance) / expected : 0.0;
+  }
+  /// Share of landmarks seen through, of those that can be judged.
+  [[nodiscard]] double seen_through() const {
+    const int told = expected + contradicted;
+    return told > 0 ? static_cast<double>(contradicted) / told : 0.0;
+  }
+};
+
+/// The largest set of verified pairs of keyframes that agree on the relative pose of two worlds.
+struct Consistency {
+  int verified = 0;                 ///< pairs in all
+  int agreeing = 0;                 ///< keyframes of the set, on the side that has fewer
+  double span_m = 0.0;              ///< largest distance between b's keyframes of the set
+  double span_rad = 0.0;            ///< largest rotation between them
+  std::vector<VerifiedPair> pairs;  ///< of the set
+};
+
+/// Relative pose of two worlds according to a set of pairs.
+struct Alignment {
+  geometry::Rigid3 a_from_b;
+  /// Covariance of log(a_from_b_true * a_from_b^-1), at the middle of b's keyframes.
+  geometry::Matrix6d covariance = geometry::Matrix6d::Identity();
+  double spread_m = 0.0;  ///< RMS of where the pairs put b's cameras, about the mean
+};
+
+/// Evidence on whether another alignment would fit as well.
+struct Ambiguity {
+  OverlayFit overlap;  ///< the maps, as aligned
+  /// Largest number of keyframes that support another alignment which the maps do not refute.
+  int alternative = 0;
+  OverlayFit alternative_overlap;  ///< of the best other alignment that is not refuted
+  double alternative_m = 0.0;      ///< distance by which that one moves b's cameras; 0: there is none
+  /// Pieces of surface of one map that the other one has, and that it saw through; counted where few
+  /// keyframes agree.
+  int surfaces_there = 0;
+  int surfaces_through = 0;
+};
+
+/// Check that other keyframes see what they should, if the alignment is right.
+struct CrossValidation {
+  int expected = 0;                 ///< keyframes of b that should see what a saw
+  int confirmed = 0;                ///< of these, that do
+  std::vector<VerifiedPair> pairs;  ///< more that agree
+};
+
+struct PairTotals {
+  int matches = 0;       ///< sums: by descriptor,
+  int inliers = 0;       ///< points and lines that fit in the end
+  double rms_px = 0.0;   ///< mean, standard deviations
+  double overlap = 0.0;  ///< of the surfaces, mean
+};
+
+/// All that was found out about two parts. What is refused at one step has no later ones.
+struct MergeEvidence {
+  std::size_t a = 0;  ///< parts, a < b
+  std::size_t b = 0;
+  int candidates = 0;  ///< pairs of keyframes that look alike
+  int tried = 0;       ///< of these, verified or refused
+  Consistency consistency;
+  Alignment alignment;
+  Ambiguity ambiguity;
+  CrossValidation validation;
+  std::vector<VerifiedPair> pairs;           ///< all that agree
+  int rejected = 0;                          ///< of these, rejected by the pose graph of all maps
+  std::map<std::string, int> refused_pairs;  ///< number of refused pairs by reason
+  bool accepted = false;
+  std::string refused;  ///< why not; empty when accepted
+  [[nodiscard]] PairTotals totals() const;
+};
+
+/// Looks for shared places among the keyframes of several parts.
+class OverlapFinder {
+ public:
+  explicit OverlapFinder(const MapFusionOptions& options)
+      : options_(options), database_(places::Vocabulary(options.vocabulary)), recogniser_(options.places) {}
+
+  struct Candidate {
+    core::KeyframeId query;
+    core::KeyframeId match;
+    std::size_t query_part = 0;
+    std::size_t match_part = 0;
+    double score = 0.0;
+  };
+
+  void add(const maps::Map& map, core::KeyframeId keyframe);
+  /// Keyframes of other parts that look like this one, best first. `before`: the keyframe before it of its
+  /// robot, or an invalid id.
+  std::vector<Candidate> recognise(const std::vector<MapPart>& parts, std::size_t part,
+                                   core::KeyframeId keyframe, core::KeyframeId before);
+  /// The same for all keyframes of all parts, one after the other; the keyframe before each is that of the
+  /// lower id.
+  std::vector<Candidate> look_at_all(const std::vector<MapPart>& parts, const core::Executor& executor);
+
+ private:
+  std::vector<Candidate> recognise(const places::Database::Scores& scores, const std::vector<MapPart>& parts,
+                                   std::size_t part, core::KeyframeId keyframe, core::KeyframeId before);
+
+  MapFusionOptions options_;
+  places::Database database_;
+  places::Recogniser recogniser_;
+};
+
+/// One candidate, verified.
+VerifiedPair verify_candidate(const std::vector<MapPart>& parts, const OverlapFinder::Candidate& candidate,
+                              const MapFusionOptions& options);
+
+/// Decides whether these pairs, all between parts a and b, show that the maps overlap, and finds their
+/// relative pose. Fills all but candidates, tried and refused_pairs. If too few agree, keyframes near them
+/// are tested first; if enough agree, more views that should show both maps.
+MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, std::size_t b,
+                             const std::vector<VerifiedPair>& found, const MapFusionOptions& options,
+                             const core::Executor& executor);
+
+/// A finder that knows all parts' keyframes, for look_at_all(): the first step of find_overlaps, and work of
+/// one thread.
+OverlapFinder learn_places(const std::vector<MapPart>& parts, const MapFusionOptions& options);
+
+/// All pairs of parts, by a, then b. The same for any number of threads. `look_alikes`: of look_at_all().
+std::vector<MergeEvidence> find_overlaps(const std::vector<MapPart>& parts,
+                                         const std::vector<OverlapFinder::Candidate>& look_alikes,
+                                         const MapFusionOptions& options, const core::Executor& executor);
+std::vector<MergeEvidence> find_overlaps(const std::vector<MapPart>& parts, const MapFusionOptions& options,
+                                         const core::Executor& executor);
+
+/// Connected groups of parts: for each part the lowest number of its group.
+std::vector<std::size_t> connected_parts(std::size_t parts, const std::vector<MergeEvidence>& merges);
+
+struct FusedMap {
+  maps::Map map;  ///< of all parts of the anchor's group, in the anchor's world frame
+  Cameras cameras;
+  std::vector<std::size_t> parts;                  ///< that are in it, ascending
+  std::vector<geometry::Rigid3> anchor_from_part;  ///< of these, before adjustment
+  int merged_points = 0;                           ///< duplicate landmarks
+  int merged_lines = 0;
+  int edges = 0;        ///< pairs of keyframes given to the pose graph
+  int rejected = 0;     ///< of these, rejected
+  int refused = 0;      ///< 1: the pose graph would have torn a map, and the parts lie at `anchor_from_part`
+  std::string refusal;  ///< location of that tear
+};
+
+/// Moves all parts that are connected with `anchor` into its world by a pose graph and merges duplicates.
+/// Poses and landmarks are not adjusted together here: that is done when surfaces are aligned too (stage
+/// refine). Merges that contradict the rest in the pose graph are no longer accepted, and the fusion is then
+/// done without them.
+FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>& merges, std::size_t anchor,
+                   const MapFusionOptions& options);
+
+}  // namespace plumbline::mapping

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "bags/part/formats/mcap_records.hpp"
+
+#include <algorithm>
+
+namespace plumbline::dataset {
+
+std::optional<Chunk> read_chunk_head(const BinaryFile& file, std::uint64_t at, std::uint64_t size) {
+  constexpr std::size_t kMostHead = 64;  // with a compression's name of up to 24 letters
+  std::array<std::uint8_t, kMostHead> head{};
+  const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(size, kMostHead));
+  if (!file.read(at, head.data(), count)) return std::nullopt;
+
+  McapFields fields(head.data(), count);
+  Chunk chunk;
+  fields.skip(2 * sizeof(std::uint64_t));  // first and last time
+  chunk.plain_size = fields.number<std::uint64_t>();
+  chunk.crc = fields.number<std::uint32_t>();
+  const std::string compression = fields.text();
+  chunk.data_size = fields.number<std::uint64_t>();
+  chunk.data_at = at + fields.position();
+  if (!fields.good() || chunk.data_size > size - fields.position()) return std::nullopt;
+
+  if (compression == "zstd") {
+    chunk.compression = Compression::kZstd;
+  } else if (compression == "lz4") {
+    chunk.compression = Compression::kLz4;
+  } else if (!compression.empty() && compression != "none") {
+    chunk.unknown = compression;
+  }
+  if (chunk.compression == Compression::kNone && chunk.plain_size != chunk.data_size) return std::nullopt;
+  return chunk;
+}
+
+}  // namespace plumbline::dataset

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "films/video_frames.hpp"
+
+#include <fmt/format.h>
+
+#include <charconv>
+
+namespace plumbline::dataset {
+namespace {
+
+constexpr std::size_t kRecent = 8;
+constexpr std::int64_t kSkipAtMost = 90;  // frames; beyond, seeking is quicker than decoding
+
+}  // namespace
+
+std::string video_frame_name(const std::string& file, std::int64_t frame) {
+  return fmt::format("{}#{}", file, frame);
+}
+
+std::optional<std::pair<std::string, std::int64_t>> video_frame_of(const std::string& name) {
+  const std::size_t mark = name.rfind('#');
+  if (mark == std::string::npos || mark + 1 == name.size()) return std::nullopt;
+  std::int64_t frame = 0;
+  const char* const end = name.data() + name.size();
+  const auto [stop, problem] = std::from_chars(name.data() + mark + 1, end, frame);
+  if (problem != std::errc() || stop != end || frame < 0) return std::nullopt;
+  return std::pair(name.substr(0, mark), frame);
+}
+
+VideoFrames::VideoFrames(std::string file) : file_(std::move(file)) {}
+
+VideoFrames::~VideoFrames() {
+  if (video_ != nullptr) decoder_->close(video_);
+}
+
+core::Result<void> VideoFrames::open() {
+  if (video_ != nullptr) return {};
+  const auto& decoder = core::part<VideoDecoder>();
+  if (!decoder) return tl::unexpected(decoder.error());
+  decoder_ = *decoder;
+  video_ = decoder_->open(file_.c_str());
+  if (video_ == nullptr) return core::input_error(file_ + ": is not a video that can be decoded");
+  return {};
+}
+
+bool VideoFrames::go_to(std::int64_t frame) {
+  const bool far = frame < next_ || frame > next_ + kSkipAtMost;
+  if (far && !decoder_->seek(video_, frame)) return false;
+  if (far) next_ = frame;
+  for (; next_ < frame; ++next_) {
+    if (!decoder_->skip(video_)) return false;
+  }
+  return true;
+}
+
+core::Result<cv::Mat> VideoFrames::read(std::int64_t frame) {
+  const std::lock_guard lock(mutex_);
+  if (auto opened = open(); !opened) return tl::unexpected(opened.error());
+  if (const auto known = recent_.find(frame); known != recent_.end()) return known->second.clone();
+  cv::Mat image;
+  if (!go_to(frame) || !decoder_->next(video_, image) || image.type() != CV_8UC3)
+    return core::input_error(fmt::format("{}: frame {} cannot be decoded", file_, frame));
+  next_ = frame + 1;
+  recent_[frame] = image.clone();
+  if (recent_.size() > kRecent) recent_.erase(recent_.begin());
+  return image.clone();
+}
+
+core::Result<std::int64_t> VideoFrames::count() {
+  const std::lock_guard lock(mutex_);
+  if (auto opened = open(); !opened) return tl::unexpected(opened.error());
+  return decoder_->count(video_);
+}
+
+}  // namespace plumbline::dataset

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <algorithm>
+#include <cctype>
+#include <string>
+
+#include "plumbline/cloud/io/cloud_io.hpp"
+#include "plumbline/cloud/io/ply.hpp"
+#include "plumbline/evaluate/surface.hpp"
+
+namespace plumbline::evaluate {
+namespace {
+
+using Points = std::vector<Eigen::Vector3f>;
+
+/// Three columns as vectors; empty when one is missing.
+Points vectors(const cloud::PlyData& ply, const char* x, const char* y, const char* z) {
+  const std::vector<float>* columns[] = {ply.floats(x), ply.floats(y), ply.floats(z)};
+  for (const std::vector<float>* column : columns) {
+    if (column == nullptr) return {};
+  }
+  Points out(ply.vertex_count);
+  for (std::size_t i = 0; i < out.size(); ++i)
+    out[i] = {(*columns[0])[i], (*columns[1])[i], (*columns[2])[i]};
+  return out;
+}
+
+std::vector<std::uint8_t> visibility(const cloud::PlyData& ply) {
+  if (const auto* bytes = ply.bytes("visible")) return *bytes;
+  std::vector<std::uint8_t> out;
+  if (const auto* floats = ply.floats("visible")) {
+    for (const float value : *floats) out.push_back(value > 0.5F ? 1 : 0);
+  }
+  return out;
+}
+
+/// Unit normals, zero where unknown; left out when none is known.
+void tidy_normals(Points& normals) {
+  bool any = false;
+  for (Eigen::Vector3f& n : normals) {
+    const float length = n.norm();
+    const bool known = n.allFinite() && length > 1e-6F;
+    n = known ? Eigen::Vector3f(n / length) : Eigen::Vector3f(Eigen::Vector3f::Zero());
+    any = any || known;
+  }
+  if (!any) normals.clear();
+}
+
+core::Result<void> check_reference(const std::filesystem::path& file, const Points& points) {
+  if (points.empty()) return core::input_error(fmt::format("{}: the reference has no points", file.string()));
+  const auto bad = std::count_if(points.begin(), points.end(), [](const auto& p) { return !p.allFinite(); });
+  if (bad > 0) {
+    return core::input_error(
+        fmt::format("{}: {} of {} points have a coordinate that is not finite (NaN or infinite); remove them "
+                    "from the reference",
+                    file.string(), bad, points.size()));
+  }
+  return {};
+}
+
+bool is_ply(const std::filesystem::path& file) {
+  std::string ending = file.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return ending == ".ply";
+}
+
+}  // namespace
+
+core::Result<Reference> load_reference(const std::filesystem::path& file) {
+  Reference reference;
+  reference.name = file.string();
+
+  if (!is_ply(file)) {
+    auto samples = load_cloud(file);
+    if (!samples) return tl::unexpected(samples.error());
+    if (const auto ok = check_reference(file, samples->points); !ok) return tl::unexpected(ok.error());
+    reference.samples = std::move(*samples);
+    return reference;
+  }
+
+  const auto ply = cloud::read_ply(file);
+  if (!ply) return tl::unexpected(ply.error());
+  if (ply->vertex_count == 0)
+    return core::input_error(fmt::format("{}: the reference has no points", file.string()));
+
+  Points points = vectors(*ply, "x", "y", "z");
+  if (points.empty())
+    return core::input_error(fmt::format("{}: has no properties x, y and z", file.string()));
+  if (const auto ok = check_reference(file, points); !ok) return tl::unexpected(ok.error());
+
+  if (!ply->triangles.empty()) {
+    reference.mesh = {std::move(points), ply->triangles, visibility(*ply)};
+    return reference;
+  }
+
+  reference.samples = {std::move(points), vectors(*ply, "nx", "ny", "nz"), visibility(*ply)};
+  tidy_normals(reference.samples.normals);
+  return reference;
+}
+
+core::Result<SurfaceSamples> load_cloud(const std::filesystem::path& file) {
+  const auto read = cloud::read_cloud(file);
+  if (!read) return tl::unexpected(read.error());
+  if (read->cloud->empty())
+    return core::input_error(fmt::format("{}: the cloud has no points", file.string()));
+  return samples_of(*read->cloud);
+}
+
+SurfaceSamples samples_of(const cloud::Cloud& cloud) {
+  SurfaceSamples samples;
+  samples.points.reserve(cloud.size());
+  samples.normals.reserve(cloud.size());
+  for (const cloud::Point& p : cloud) {
+    samples.points.emplace_back(p.x, p.y, p.z);
+    samples.normals.emplace_back(p.normal_x, p.normal_y, p.normal_z);
+  }
+  tidy_normals(samples.normals);
+  return samples;
+}
+
+}  // namespace plumbline::evaluate

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "alignment/frame_aligner.hpp"
+
+#include <cmath>
+
+#include "observable_directions.hpp"
+#include "plumbline/features/rolling_shutter.hpp"
+#include "plumbline/tracking/align_points.hpp"
+#include "plumbline/tracking/pose_terms.hpp"
+
+namespace plumbline::tracking {
+namespace {
+
+using geometry::Rigid3;
+
+constexpr AlignmentRound kCoarse[] = {
+    // search, plane, samples, level, rematch, reject outliers
+    {0.0, 0.15, 500, 1, true, false},
+    {0.0, 0.08, 700, 1, false, false}};
+constexpr AlignmentRound kFine[] = {{kFineRadius_px, 0.05, 1200, 0, true, true},
+                                    {kFineRadius_px, 0.03, 2400, 0, false, true},
+                                    {kFineRadius_px, 0.03, 2400, 0, false, false}};
+
+constexpr int kIterations = 3;      // per round; the next one associates again
+constexpr double kPointGate = 7.8;  // chi-square, 2 degrees of freedom, 98 %
+constexpr double kLineGate = 9.2;   // 99 %: line ends are less exact than corners
+constexpr double kLineSigma_px = 0.6;
+
+}  // namespace
+
+FrameAligner::FrameAligner(const AlignmentInput& input, const Rigid3& hypothesis, double search_radius_px)
+    : in_(input),
+      search_radius_px_(search_radius_px),
+      predicted_(input.motion.continuous() ? input.motion.predict(input.frame.stamp) : hypothesis),
+      use_motion_prior_(!input.motion.contradicted()) {
+  problem_.camera = in_.camera;
+  result_.camera_from_world = hypothesis;
+  result_.depth_from_camera = in_.depth_from_camera;
+}
+
+TrackResult FrameAligner::run() {
+  if (search_radius_px_ > 0.0) {
+    for (const AlignmentRound& round : kCoarse) align(round);
+    correct_rolling_shutter();
+  }
+  for (const AlignmentRound& round : kFine) align(round);
+  if (contradicts_motion_prior()) {
+    use_motion_prior_ = false;
+    for (const AlignmentRound& round : kFine) align(round);
+  }
+  judge();
+  return std::move(result_);
+}
+
+void FrameAligner::align(const AlignmentRound& round) {
+  if (round.rematch) match_landmarks(round);  // points and lines, by projection: e_p and e_l of section 3.2
+  associate_surface(round);                   // point to plane
+  associate_intensity(round);                 // direct alignment
+  solve();                                    // Levenberg-Marquardt with all families
+  constrain_degenerate_directions();          // by the motion prior
+  if (round.reject_outliers) reject_outliers();  // chi-square gates
+}
+
+/// Repeats the rolling-shutter correction: the motion model, with which it was made, lags behind a changing
+/// motion, which is now known from the rough pose.
+void FrameAligner::correct_rolling_shutter() {
+  const double readout_s = in_.options.readout_s;
+  const double dt = in_.frame.stamp - in_.motion.last_stamp();
+  if (readout_s == 0.0 || !in_.motion.continuous() || dt < 1e-4 || dt > 0.5) return;
+  const Rigid3 step = result_.camera_from_world * in_.motion.camera_from_world().inverse();
+  const geometry::Vector6d mean = geometry::log_se3(step) / dt;
+  // Both velocities are means over their steps; extrapolate by half a step.
+  const geometry::Vector6d before = in_.motion.velocity();
+  const geometry::Vector6d change = before.isZero(0.0) ? mean : geometry::Vector6d(1.5 * (mean - before));
+  auto corrected = std::make_shared<features::FrameFeatures>(in_.features);
+  features::undo_rolling_shutter(*corrected, in_.camera, change, readout_s);
+  result_.features = std::move(corrected);
+}
+
+void FrameAligner::match_landmarks(const AlignmentRound& round) {
+  const double radius = round.search_radius_px > 0.0 ? round.search_radius_px : search_radius_px_;
+  const AssociationOptions& how = in_.options.association;
+  const Rigid3& pose = result_.camera_from_world;
+  result_.visible_points.clear();
+  result_.visible_lines.clear();
+  result_.doubtful.clear();
+
+  if (in_.options.points) {
+    result_.points = match_points(in_.map, in_.local_map.points, features(), in_.camera, pose, radius, how,
+                                  &result_.visible_points);
+    if (how.align && round.reject_outliers)
+      align_points(in_.map, features(), in_.camera, pose, how.scale_factor, result_.points);
+    problem_.points = point_terms(in_.map, result_.points, features(), how);
+  }
+
+  if (in_.options.lines) {
+    result_.lines = match_lines(in_.map, in_.local_map.lines, features(), in_.camera, pose, radius, how,
+                                &result_.visible_lines);
+    problem_.lines = line_terms(in_.map, result_.lines, features(), kLineSigma_px);
+  }
+}
+
+void FrameAligner::associate_surface(const AlignmentRound& round) {
+  if (!in_.options.depth) return;
+  SurfaceAssociationOptions how;
+  how.max_distance_m = round.max_plane_distance_m;
+  how.max_samples = round.surface_samples;
+  problem_.planes = tracking::associate_surface(in_.local_map.surface, in_.frame.depth, in_.camera,
+                                                result_.camera_from_world, in_.depth_from_camera, how,
+                                                &result_.surface_in_view);
+}
+
+void FrameAligner::associate_intensity(const AlignmentRound& round) {
+  if (!in_.options.photometric || features().photometric == nullptr) return;
+  const bool again = intensity_level_ == round.pyramid_level && problem_.photometric &&
+                     update_photometric(*problem_.photometric, result_.camera_from_world);
+  if (!again) {
+    problem_.photometric = in_.photometric.associate(
+        in_.map, in_.local_map.keyframes, round.pyramid_level,
+        {features().photometric.get(), &in_.frame.depth, in_.depth_from_camera, in_.camera},
+        result_.camera_from_world);
+  }
+  intensity_level_ = round.pyramid_level;
+}
+
+/// Solves for the pose; once more without the intensity terms if they disagree.
+void FrameAligner::solve() {
+  optimize::PoseSolverOptions solver = in_.options.solver;
+  solver.max_iterations = kIterations;
+  result_.estimate = optimize::solve_pose(problem_, result_.camera_from_world, solver);
+  if (problem_.photometric &&
+      !photometric_agrees(*problem_.photometric, result_.estimate.camera_from_world)) {
+    problem_.photometric.reset();
+    result_.estimate = optimize::solve_pose(problem_, result_.camera_from_world, solver);
+  }
+  result_.camera_from_world = result_.estimate.camera_from_world;
+}
+
+void FrameAligner::constrain_degenerate_directions() {
+  surface_only_ = uses_features() && !problem_.photometric && feature_inliers() < in_.options.min_inliers;
+  if (!in_.options.motion_prior) return;
+  MotionTrust trust = MotionTrust::kUnknown;
+  if (use_motion_prior_ && surface_only_) trust = MotionTrust::kSurfaceOnly;
+  if (use_motion_prior_ && !surface_only_ && in_.motion.reliable(in_.frame.stamp))
+    trust = MotionTrust::kLikely;
+  problem_.prior = motion_prior(result_.estimate.information, predicted_, trust);
+}
+
+void FrameAligner::reject_outliers() {
+  const std::vector<double> errors = optimize::point_errors(problem_, result_.camera_from_world);
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    if (errors[i] > kPointGate && result_.points[i].aligned) result_.doubtful.push_back(result_.points[i]);
+  }
+  keep_inliers(errors, kPointGate, result_.points, problem_.points);
+  keep_inliers(optimize::line_errors(problem_, result_.camera_from_world), kLineGate, result_.lines,
+               problem_.lines);
+}
+
+int FrameAligner::feature_inliers() const {
+  return result_.estimate.points.inliers + 2 * result_.estimate.lines.inliers;
+}
+
+}  // namespace plumbline::tracking

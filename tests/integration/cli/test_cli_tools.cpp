@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The commands around map: help, info, render, export, evaluate, synth, filter, pipelines.
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include "plumbline/cloud/io/cloud_io.hpp"
+#include "plumbline/dataset/trajectory_io.hpp"
+#include "program.hpp"
+#include "wall_recording.hpp"
+
+namespace plumbline::integration {
+namespace {
+
+class Tools : public ProgramTest {
+ protected:
+  void map_wall() {
+    write_wall(path("wall"));
+    const Outcome o = run("map wall -o out -p known_poses -q --set output.views= --set fuse.voxel=2cm");
+    ASSERT_EQ(o.code, 0) << o;
+  }
+  [[nodiscard]] std::size_t points(const std::string& file) const {
+    const auto read = cloud::read_cloud(path(file));
+    return read ? read->cloud->size() : 0;
+  }
+};
+
+TEST_F(Tools, HelpAndVersionEverywhere) {
+  for (const char* command :
+       {"", "map", "info", "render", "report", "export", "evaluate", "evaluate trajectory", "evaluate cloud",
+        "synth", "filter", "filters", "filters list", "filters describe", "filters check", "pipelines",
+        "pipelines list", "pipelines check"}) {
+    const Outcome help = run(std::string(command) + " --help");
+    EXPECT_EQ(help.code, 0) << command;
+    EXPECT_NE(help.out.find("Usage"), std::string::npos) << command;
+    EXPECT_EQ(help.err, "") << command;
+  }
+  for (const char* command : {"", "map", "evaluate", "evaluate cloud"}) {
+    const Outcome version = run(std::string(command) + " --version");
+    EXPECT_EQ(version.code, 0) << command;
+    EXPECT_EQ(version.out.rfind("plumbline ", 0), 0U) << command << version;
+  }
+}
+
+TEST_F(Tools, InfoOfRecordingMapAndCloud) {
+  map_wall();
+  const Outcome recording = run("info wall");
+  EXPECT_EQ(recording.code, 0) << recording;
+  EXPECT_NE(recording.out.find("tum"), std::string::npos) << recording;
+  EXPECT_NE(recording.out.find("12"), std::string::npos) << recording;
+  const Outcome map = run("info out");
+  EXPECT_EQ(map.code, 0) << map;
+  EXPECT_NE(map.out.find("frames.tracked: 12"), std::string::npos) << map;
+  const Outcome cloud = run("info out/map.pcd");
+  EXPECT_EQ(cloud.code, 0) << cloud;
+  EXPECT_NE(cloud.out.find("points: " + std::to_string(points("out/map.ply"))), std::string::npos) << cloud;
+  const Outcome path_info = run("info out/trajectory.txt");
+  EXPECT_EQ(path_info.code, 0) << path_info;
+  EXPECT_EQ(path_info.out.rfind("poses: 12\nfrom: 10.000000 s\n", 0), 0U) << path_info;
+  EXPECT_EQ(run("info nothing").code, 3);
+}
+
+TEST_F(Tools, RenderNeedsNoDisplay) {
+  map_wall();
+  for (const char* input : {"out", "out/map.ply", "out/map.pcd"}) {
+    const Outcome o =
+        run(std::string("render ") + input + " -o shot.png --view top --size 320x200", "env -u DISPLAY ");
+    ASSERT_EQ(o.code, 0) << o;
+    const cv::Mat shot = cv::imread(path("shot.png").string());
+    EXPECT_EQ(shot.size(), cv::Size(320, 200));
+    fs::remove(path("shot.png"));
+  }
+  EXPECT_EQ(run("render out -o shot.png --view tpo").code, 2);
+  EXPECT_EQ(run("render out -o shot.jpg").code, 2);
+  EXPECT_EQ(run("render nothing -o shot.png").code, 3);
+  EXPECT_EQ(run("render wall -o shot.png").code, 3);
+  EXPECT_EQ(run("render out -o nowhere/shot.png").code, 5);
+  EXPECT_EQ(run("render out -o shot.png --color error").code, 2);
+}
+
+TEST_F(Tools, ExportsCloudPathAndLines) {
+  map_wall();
+  EXPECT_EQ(run("export out -o c.pcd").code, 0);
+  EXPECT_EQ(run("export out -o c.ply").code, 0);
+  EXPECT_EQ(points("c.pcd"), points("out/map.ply"));
+  EXPECT_EQ(points("c.ply"), points("out/map.ply"));
+  EXPECT_EQ(run("export out --what trajectory -o t.txt").code, 0);
+  const auto rows = [&](const char* file) {  // comments above them differ
+    const std::string text = slurp(path(file));
+    return text.substr(text.find("\n10."));
+  };
+  EXPECT_EQ(rows("t.txt"), rows("out/trajectory.txt"));
+  EXPECT_EQ(run("export out --what keyframes -o k.ply").code, 0);
+  EXPECT_EQ(run("export out --what lines -o l.ply").code, 0);
+  EXPECT_EQ(run("export out -o c.obj").code, 0);  // a mesh
+  EXPECT_EQ(run("export wall -o c.ply").code, 3);
+  EXPECT_EQ(run("export out/map.ply -o again.pcd").code, 0);  // a cloud by itself
+  EXPECT_EQ(points("again.pcd"), points("out/map.ply"));
+  EXPECT_EQ(run("export out/map.ply --what trajectory -o t.txt").code, 2);
+  const Outcome file = run("export out/summary.json -o c.ply");
+  EXPECT_EQ(file.code, 3);
+  EXPECT_TRUE(file.told("out/summary.json: is a file; give the result folder")) << file;
+}
+
+TEST_F(Tools, EvaluateTellsWhatIsThere) {
+  map_wall();
+  const Outcome text = run("evaluate trajectory out wall/groundtruth.txt");
+  EXPECT_EQ(text.code, 0) << text;
+  const Outcome json =
+      run("evaluate trajectory out/trajectory.txt wall --frames wall/rgb.txt --json --align none");
+  ASSERT_EQ(json.code, 0) << json;
+  const auto report = nlohmann::json::parse(json.out);
+  EXPECT_LT(report["ate_m"]["rmse"], 1e-5);
+  EXPECT_EQ(report["tracked_percent"], 100.0);
+  EXPECT_EQ(run("evaluate trajectory out nothing.txt").code, 3);
+  EXPECT_EQ(run("evaluate trajectory out wall --align so3").code, 2);
+  const Outcome plots = run("evaluate trajectory out wall --plot charts");
+  EXPECT_EQ(plots.code, 0) << plots;
+  EXPECT_FALSE(fs::is_empty(path("charts")));
+
+  const Outcome cloud = run("evaluate cloud out out/map.ply --json");
+  ASSERT_EQ(cloud.code, 0) << cloud;
+  EXPECT_LT(nlohmann::json::parse(cloud.out)["accuracy_mm"]["rmse"], 1.0) << cloud;
+  EXPECT_EQ(run("evaluate cloud out").code, 0);
+  EXPECT_EQ(run("evaluate cloud out out/map.ply --trajectory out/trajectory.txt").code, 2);
+  const std::string start =
+      "evaluate cloud out out/map.ply --json --trajectory out --truth out/trajectory.txt";
+  EXPECT_EQ(nlohmann::json::parse(run(start).out)["alignment"]["type"], "se3");
+  EXPECT_EQ(nlohmann::json::parse(run(start + " --align none").out)["alignment"]["type"], "none");
+}
+
+TEST_F(Tools, SynthWritesARecordingThatMaps) {
+  const Outcome o = run("synth room -o world --frames 3 --width 160 --height 120 --reference-spacing 10cm");
+  ASSERT_EQ(o.code, 0) << o;
+  EXPECT_TRUE(fs::exists(path("world/reference.ply")));
+  EXPECT_EQ(run("synth room -o world").code, 2);
+  EXPECT_EQ(run("synth room -o other --texture velvet").code, 2);
+  EXPECT_EQ(run("map world/robot0 -o out -p known_poses -q --set output.views=").code, 0);
+}
+
+TEST_F(Tools, FilterRunsAChainAndTellsWhatItDid) {
+  map_wall();
+  write("chain.yaml", "chain: coarse\nfilters:\n  - type: voxel_grid\n    leaf: 10 cm\n");
+  const Outcome o = run("filter chain.yaml out/map.ply coarse.pcd");
+  ASSERT_EQ(o.code, 0) << o;
+  EXPECT_NE(o.out.find("voxel_grid"), std::string::npos) << o;
+  EXPECT_LT(points("coarse.pcd"), points("out/map.ply"));
+  EXPECT_GT(points("coarse.pcd"), 0U);
+  write("bad.yaml", "chain: bad\nfilters:\n  - type: voxel_gird\n");
+  const Outcome bad = run("filter bad.yaml out/map.ply x.ply");
+  EXPECT_EQ(bad.code, 2) << bad;
+  EXPECT_TRUE(bad.told("bad.yaml:3:")) << bad;
+  EXPECT_EQ(run("filter chain.yaml nothing.ply x.ply").code, 3);
+  EXPECT_EQ(run("filter chain.yaml out/map.ply x.obj").code, 2);
+}
+
+TEST_F(Tools, ShippedPipelinesAndFiltersHaveNothingWrong) {
+  const fs::path shipped = fs::path(PLUMBLINE_SOURCE_DIR) / "pipelines";
+  const Outcome list = run("pipelines list");
+  EXPECT_EQ(list.code, 0);
+  for (const auto& entry : fs::directory_iterator(shipped)) {
+    if (entry.path().extension() != ".yaml") continue;
+    const std::string name = entry.path().stem().string();
+    EXPECT_NE(list.out.find(name), std::string::npos);
+    const Outcome check = run("pipelines check " + name);
+    EXPECT_EQ(check.code, 0) << check;
+  }
+  for (const auto& entry : fs::directory_iterator(shipped / "filters")) {
+    if (entry.path().extension() != ".yaml") continue;
+    const Outcome check = run("filters check " + entry.path().stem().string());
+    EXPECT_EQ(check.code, 0) << check;
+  }
+  EXPECT_EQ(run("filters check examples/voxel_grid").code, 0);
+  EXPECT_EQ(run("filters check examples").code, 2);  // a folder
+  const Outcome filters = run("filters list");
+  EXPECT_NE(filters.out.find("voxel_grid"), std::string::npos) << filters;
+  EXPECT_EQ(run("filters describe voxel_grid").code, 0);
+  EXPECT_EQ(run("filters describe voxel_gird").code, 2);
+}
+
+}  // namespace
+}  // namespace plumbline::integration
