@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """The module as its users have it: python3 -m unittest, with PYTHONPATH at the built module and PLUMBLINE_PROGRAM set."""
+import csv
 import gc
 import filecmp
 import logging
@@ -248,9 +249,30 @@ class Results(Folder):
         self.assertEqual(keyframes.poses.shape, (len(keyframes.stamps), 4, 4))
         stamps = plumbline.open(self.recording).stamps
         np.testing.assert_allclose(stamps[keyframes.frames], keyframes.stamps, atol=1e-5)
+        self.assertEqual(set(keyframes.robots), {Path(self.recording).name})
+        path = plumbline.Trajectory.read(self.work / "out" / "keyframes.txt")
+        np.testing.assert_allclose(keyframes.poses, path.poses, atol=1e-7)
         self.assertEqual(result.lines.shape[1:], (2, 3))
         self.assertEqual((result.camera.width, result.camera.height), (320, 240))
         self.assertEqual(result.image(int(keyframes.frames[-1])).color.shape, (240, 320, 3))
+
+    def test_covariances_are_those_of_the_export(self):
+        plumbline.export(self.result, self.work / "poses.csv", what="trajectory")
+        with open(self.work / "poses.csv", encoding="utf-8") as file:
+            rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+        axes = ["x", "y", "z", "rx", "ry", "rz"]
+        covariance = self.result.trajectory.covariance
+        self.assertEqual(covariance.shape, (60, 6, 6))
+        for row, column in ((0, 0), (1, 2), (2, 4), (5, 5)):
+            exported = [float(line[f"cov_{axes[row]}_{axes[column]}"]) for line in rows]
+            np.testing.assert_allclose(covariance[:, row, column], exported, rtol=1e-4, atol=1e-13)
+            np.testing.assert_allclose(covariance[:, row, column], covariance[:, column, row], rtol=1e-9, atol=1e-18)
+        keyframes = self.result.keyframes
+        at = np.searchsorted(self.result.trajectory.stamps, keyframes.stamps - 1e-5)
+        sigmas = np.sqrt(np.trace(covariance[at, :3, :3], axis1=1, axis2=2))
+        np.testing.assert_allclose(sigmas, keyframes.sigma_position, atol=1e-6)
+        self.assertGreater(sigmas.max(), 0.0)
+        self.assertIsNone(plumbline.open(self.recording).truth.covariance)
 
     def test_landmarks_lie_where_their_keyframes_saw_them(self):
         landmarks, keyframes, camera = self.result.landmarks, self.result.keyframes, self.result.camera
@@ -333,6 +355,12 @@ class Results(Folder):
         other = plumbline.map(self.recording, self.work / "other", start=0.4)
         both = plumbline.fuse([self.result, other], self.work / "both")
         self.assertEqual(len(both.robots), 2)
+        self.assertEqual({path.covariance.shape[1:] for path in both.robots.values()}, {(6, 6)})
+        with self.assertRaisesRegex(plumbline.InputError, "several robots"):
+            both.trajectory
+        self.assertEqual(set(both.keyframes.robots), set(both.robots))
+        self.assertLessEqual(set(both.landmarks.robot), set(both.robots))
+        self.assertGreaterEqual(both.keyframes.frames.min(), 0)
         self.assertTrue(both.trustworthy, both.reason)
 
     def test_no_result_is_an_input_error(self):

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+
 #include "background.hpp"
 #include "bindings.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/features/frame_features.hpp"
+#include "plumbline/maps/fusion_state.hpp"
 #include "plumbline/maps/result_folder.hpp"
 #include "plumbline/maps/stored_result.hpp"
 
@@ -31,8 +34,15 @@ py::array_t<double> read_lines(const fs::path& file) {
   return owned(std::move(ends), {static_cast<py::ssize_t>(lines.size()), 2, 3});
 }
 
+std::map<std::int32_t, std::string> names_of(const std::vector<maps::RobotInfo>& robots) {
+  std::map<std::int32_t, std::string> names;
+  for (const maps::RobotInfo& robot : robots) names[robot.number] = robot.name;
+  return names;
+}
+
 /// Points of the map and who saw them: positions (N x 3, in the result's frame), for each observation the
-/// number of its point, its keyframe, that one's frame, and its pixel.
+/// number of its point, its keyframe, that one's frame, its pixel, and the robot's number; names of robots by
+/// number.
 py::tuple read_landmarks(const fs::path& folder) {
   const auto stored = [&] {
     const py::gil_scoped_release free;
@@ -46,6 +56,7 @@ py::tuple read_landmarks(const fs::path& folder) {
   std::vector<std::int32_t> keyframes;
   std::vector<std::int64_t> frames;
   std::vector<float> pixels;
+  std::vector<std::int32_t> robots;
   std::int32_t number = 0;
 
   for (const core::PointId id : map.point_ids()) {
@@ -60,6 +71,7 @@ py::tuple read_landmarks(const fs::path& folder) {
       keyframes.push_back(seen.keyframe.index);
       frames.push_back(keyframe.frame_index);
       pixels.insert(pixels.end(), pixel.data(), pixel.data() + 2);
+      robots.push_back(seen.keyframe.robot);
     }
     ++number;
   }
@@ -67,16 +79,54 @@ py::tuple read_landmarks(const fs::path& folder) {
   const auto count = static_cast<py::ssize_t>(points.size());
   return py::make_tuple(owned(std::move(positions), {number, 3}), owned(std::move(points), {count}),
                         owned(std::move(keyframes), {count}), owned(std::move(frames), {count}),
-                        owned(std::move(pixels), {count, 2}));
+                        owned(std::move(pixels), {count, 2}), owned(std::move(robots), {count}),
+                        names_of(stored.stored().header.robots));
 }
 
-/// Frame number of each keyframe, by its number; empty where there is no map.db.
-std::map<std::int32_t, std::int64_t> keyframe_frames(const fs::path& folder) {
-  const auto stored = value_of(maps::StoredResult::open(value_of(maps::find_map(folder))));
-  std::map<std::int32_t, std::int64_t> frames;
-  for (const core::KeyframeId id : stored.stored().map.keyframe_ids())
-    frames[id.index] = stored.stored().map.keyframe(id).frame_index;
+/// Frame number of each keyframe, by its robot's name and its number.
+std::map<std::pair<std::string, std::int32_t>, std::int64_t> keyframe_frames(const fs::path& folder) {
+  const maps::StoreReader reader = value_of(maps::StoreReader::open(value_of(maps::find_map(folder)).store));
+  const std::map<std::int32_t, std::string> names = names_of(reader.header().robots);
+  std::map<std::pair<std::string, std::int32_t>, std::int64_t> frames;
+  for (const maps::StoredMap& stored : value_of(reader.load_each())) {
+    for (const core::KeyframeId id : stored.map.keyframe_ids())
+      frames[{names.at(id.robot), id.index}] = stored.map.keyframe(id).frame_index;
+  }
   return frames;
+}
+
+/// Covariances (N x 6 x 6) of a robot's poses: of the position (m) and of small turns about the world's axes
+/// (rad). That of a frame between keyframes is that of the keyframe before. `robot`: its name; "": the first.
+/// None: not known.
+py::object pose_covariances(const fs::path& folder, const std::string& robot,
+                            const py::array_t<double>& stamps, const py::array_t<double>& poses) {
+  constexpr double kRounding_s = 2e-6;  // of the stamps in text files
+  const geometry::Trajectory trajectory = trajectory_of(stamps, poses);
+  const maps::StoreReader reader = value_of(maps::StoreReader::open(value_of(maps::find_map(folder)).store));
+
+  const std::vector<maps::RobotInfo>& robots = reader.header().robots;
+  const auto named = std::find_if(robots.begin(), robots.end(), [&](const maps::RobotInfo& info) {
+    return robot.empty() || info.name == robot;
+  });
+  const auto kept = value_of(reader.attachment(maps::kFusionAttachment));
+  if (named == robots.end() || !kept) return py::none();
+
+  std::vector<double> times;
+  for (const geometry::StampedPose& pose : trajectory) times.push_back(pose.stamp + kRounding_s);
+  const std::vector<geometry::Matrix6d> covariances =
+      value_of(maps::fusion_state_of(*kept))
+          .covariances_of(std::vector<std::int32_t>(times.size(), named->number), times);
+  if (covariances.empty()) return py::none();
+
+  // Kept are those of (rho, phi) in Exp(rho, phi) camera_from_world.
+  std::vector<double> values;
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    geometry::Matrix6d turn = geometry::Matrix6d::Zero();
+    turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = trajectory[i].world_from_camera.rotation;
+    const geometry::Matrix6d in_world = turn * covariances[i] * turn.transpose();  // symmetric: either order
+    values.insert(values.end(), in_world.data(), in_world.data() + 36);
+  }
+  return owned(std::move(values), {static_cast<py::ssize_t>(times.size()), 6, 6});
 }
 
 std::vector<fs::path> robot_folders(const fs::path& folder) {
@@ -91,6 +141,8 @@ void add_maps(py::module_& module) {
   module.def("read_lines", &read_lines, py::arg("file"));
   module.def("read_landmarks", &read_landmarks, py::arg("folder"));
   module.def("keyframe_frames", &keyframe_frames, py::arg("folder"));
+  module.def("pose_covariances", &pose_covariances, py::arg("folder"), py::arg("robot"), py::arg("stamps"),
+             py::arg("poses"));
   module.def("robot_folders", &robot_folders, py::arg("folder"));
 }
 

@@ -8,7 +8,7 @@ import json
 import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Dict, NamedTuple, Optional
+from typing import Any, Dict, List, NamedTuple, Optional, Tuple
 
 import numpy as np
 import numpy.typing as npt
@@ -22,14 +22,15 @@ from ._values import PathLike
 
 
 class Keyframes(NamedTuple):
-    """All N keyframes by time.
+    """All N keyframes by time, robot after robot.
 
     stamps          N, seconds
     poses           N x 4 x 4, world_from_camera, metres
-    numbers         N, as in keyframes.csv and Landmarks
+    numbers         N, as in keyframes.csv and Landmarks; each robot has its own
     frames          N, numbers of the frames that they were made of; -1: not known (no map.db)
     sigma_position  N, metres, beside the first keyframe: root of the trace of the covariance; NaN: not known
     sigma_rotation  N, radians
+    robots          N, names
     """
 
     stamps: npt.NDArray[np.float64]
@@ -38,6 +39,7 @@ class Keyframes(NamedTuple):
     frames: npt.NDArray[np.int64]
     sigma_position: npt.NDArray[np.float64]
     sigma_rotation: npt.NDArray[np.float64]
+    robots: npt.NDArray[np.str_]
 
 
 class Landmarks(NamedTuple):
@@ -48,6 +50,7 @@ class Landmarks(NamedTuple):
     keyframe   M, number of the keyframe that saw it (Keyframes.numbers)
     frame      M, that keyframe's frame
     pixel      M x 2, where, in the rectified image; (0, 0) is the centre of the first pixel
+    robot      M, name of the robot whose keyframe it is
     """
 
     points: npt.NDArray[np.float64]
@@ -55,6 +58,20 @@ class Landmarks(NamedTuple):
     keyframe: npt.NDArray[np.int32]
     frame: npt.NDArray[np.int64]
     pixel: npt.NDArray[np.float32]
+    robot: npt.NDArray[np.str_]
+
+
+def _matrices(*columns: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """N x 4 x 4 of positions and unit quaternions: tx, ty, tz, qx, qy, qz, qw, each N."""
+    tx, ty, tz, x, y, z, w = columns
+    zero, one = np.zeros_like(tx), np.ones_like(tx)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), tx],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w), ty],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y), tz],
+        [zero, zero, zero, one],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0).copy()
 
 
 class Result:
@@ -66,7 +83,7 @@ class Result:
     def __init__(self, folder: PathLike, _kept: Optional["TemporaryDirectory[str]"] = None) -> None:
         self.folder = Path(folder)
         self._kept = _kept  # a Mapper's own folder lives as long as its result
-        _core.robot_folders(self.folder)  # InputError: not a result
+        self._robot_folders  # raises InputError: not a result
 
     def __repr__(self) -> str:
         return f"<plumbline.Result {self.folder}>"
@@ -88,16 +105,29 @@ class Result:
 
     @functools.cached_property
     def trajectory(self) -> Trajectory:
-        """Poses of the tracked frames, of one robot; see `robots` for several."""
-        return Trajectory.read(self.folder / "trajectory.txt")
+        """Poses of the tracked frames, of one robot, with their covariance. Raises InputError for several: see `robots`."""
+        if len(self._robot_folders) > 1:
+            names = ", ".join(folder.name for folder in self._robot_folders)
+            raise _core.InputError(f"{self.folder}: has the paths of several robots ({names}); they are in .robots")
+        return self._path(self._robot_folders[0])
 
     @functools.cached_property
     def robots(self) -> Dict[str, Trajectory]:
         """The path of each robot, by its name; of one robot under the name "". """
-        folders = _core.robot_folders(self.folder)
-        if len(folders) == 1 and folders[0] == self.folder:
+        if self._robot_folders == [self.folder]:
             return {"": self.trajectory}
-        return {folder.name: Trajectory.read(folder / "trajectory.txt") for folder in folders}
+        return {folder.name: self._path(folder) for folder in self._robot_folders}
+
+    @functools.cached_property
+    def _robot_folders(self) -> List[Path]:
+        return _core.robot_folders(self.folder)
+
+    def _path(self, folder: Path) -> Trajectory:
+        path = Trajectory.read(folder / "trajectory.txt")
+        robot = "" if folder == self.folder else folder.name
+        if (self.folder / "map.db").exists():
+            path._kept = (self.folder, robot)
+        return path
 
     @functools.cached_property
     def cloud(self) -> Cloud:
@@ -107,19 +137,22 @@ class Result:
 
     @functools.cached_property
     def keyframes(self) -> Keyframes:
-        path = Trajectory.read(self.folder / "keyframes.txt")
         with open(self.folder / "keyframes.csv", encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
-        numbers = np.array([int(row["keyframe"]) for row in rows], np.int32)
-        known: Dict[int, int] = {}
+        known: Dict[Tuple[str, int], int] = {}
         if (self.folder / "map.db").exists():
             known = _core.keyframe_frames(self.folder)
 
         def column(name: str) -> npt.NDArray[np.float64]:
-            return np.array([float(row[name]) if row[name] else np.nan for row in rows])
+            return np.array([float(row[name]) if row[name] else np.nan for row in rows], np.float64)
 
-        frames = np.array([known.get(int(number), -1) for number in numbers], np.int64)
-        return Keyframes(path.stamps, path.poses, numbers, frames, column("sigma_position"), column("sigma_rotation"))
+        poses = _matrices(*(column(name) for name in ("tx", "ty", "tz", "qx", "qy", "qz", "qw")))
+        names = [(row["robot"], int(row["keyframe"])) for row in rows]
+        return Keyframes(
+            column("stamp"), poses, np.array([number for _, number in names], np.int32),
+            np.array([known.get(name, -1) for name in names], np.int64),
+            column("sigma_position"), column("sigma_rotation"), np.array([robot for robot, _ in names], np.str_),
+        )
 
     @functools.cached_property
     def lines(self) -> npt.NDArray[np.float64]:
@@ -129,12 +162,14 @@ class Result:
     @functools.cached_property
     def landmarks(self) -> Landmarks:
         """Raises InputError when the result has no map.db (store.enabled=off)."""
-        return Landmarks(*_core.read_landmarks(self.folder))
+        points, point, keyframe, frame, pixel, robots, names = _core.read_landmarks(self.folder)
+        robot = np.array([names[number] for number in robots], np.str_)
+        return Landmarks(points, point, keyframe, frame, pixel, robot)
 
     @functools.cached_property
     def camera(self) -> Camera:
         """As it was used: given, or what the run found out about it. Of several robots that of the first."""
-        folder = _core.robot_folders(self.folder)[0]
+        folder = self._robot_folders[0]
         file = folder / "camera.yaml"
         return Camera.from_yaml((file if file.exists() else self.folder / "camera.yaml").read_text(encoding="utf-8"))
 

@@ -2,8 +2,10 @@
 """Stamped camera poses."""
 from __future__ import annotations
 
+import functools
 import os
-from typing import Union
+from pathlib import Path
+from typing import Optional, Tuple, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +24,7 @@ class Trajectory:
     def __init__(self, stamps: npt.ArrayLike, poses: npt.ArrayLike) -> None:
         self.stamps: npt.NDArray[np.float64] = np.asarray(stamps, dtype=np.float64)
         self.poses: npt.NDArray[np.float64] = np.asarray(poses, dtype=np.float64)
+        self._kept: Optional[Tuple[Path, str]] = None  # result folder and robot, where the covariance is
         if self.poses.ndim != 3 or self.poses.shape[1:] != (4, 4) or len(self.stamps) != len(self.poses):
             raise _core.InputError(
                 f"a trajectory has N stamps and N x 4 x 4 poses, not {self.stamps.shape} and {self.poses.shape}"
@@ -43,6 +46,13 @@ class Trajectory:
     def positions(self) -> npt.NDArray[np.float64]:
         """N x 3, metres."""
         return self.poses[:, :3, 3]
+
+    @functools.cached_property
+    def covariance(self) -> Optional[npt.NDArray[np.float64]]:
+        """N x 6 x 6, of the position (metres) and of small turns about the world's axes (radians), beside the first
+        keyframe; between keyframes that of the keyframe before. None: not known; results that went through the stage
+        refine and have a map.db know it."""
+        return None if self._kept is None else _core.pose_covariances(*self._kept, self.stamps, self.poses)
 
     def __len__(self) -> int:
         return len(self.stamps)
