@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # docker build -t plumbline . && docker run --rm -v "$PWD:/work" plumbline map recording -o out
-# The first stage makes the packages, the second one installs them. tests/packaging/run_dockerfile.py runs the same steps
-# without a Docker engine.
+# The first stage makes the packages, the second one installs them. tests/packaging/run_packages.py runs the second one's
+# steps without a Docker engine.
 FROM debian:bookworm-slim AS build
 COPY . /source
 WORKDIR /source

@@ -86,7 +86,7 @@ def main(root, out, version):
         "use_directory_urls": False,
         "theme": {"name": "material", "font": False, "features": ["navigation.indexes", "navigation.top"]},
         "plugins": ["search"],
-        "markdown_extensions": ["tables", "fenced_code", "toc", "admonition"],
+        "markdown_extensions": ["tables", "fenced_code", "toc", "admonition", "pymdownx.highlight"],
         "nav": navigation(root),
     }
     (out / "mkdocs.yml").write_text(json.dumps(settings, indent=1))  # JSON is YAML

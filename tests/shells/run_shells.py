@@ -32,6 +32,9 @@ COMPLETED = [
     ("plumbline render out --color hei", "plumbline render out --color height "),
     ("plumbline completion fi", "plumbline completion fish "),
     ("plumbline map a_recor", "plumbline map a_recording/"),
+    ("plumbline map synth:corr", "plumbline map synth:corridor "),
+    ("plumbline render both --robot upst", "plumbline render both --robot upstairs "),
+    ("plumbline fuse both --anchor cel", "plumbline fuse both --anchor cellar "),
 ]
 
 
@@ -72,6 +75,16 @@ def check_pages(program, work):
             if not re.search(rf"{flag}(?![\w-])", shown):
                 problems.append(f"{page.name}: does not have {flag}")
     return problems
+
+
+def map_two_robots(program, work):
+    """A result of robots whose names nothing else has; both see the same."""
+    size = ["--frames", "60", "--width", "320", "--height", "240"]
+    run(program, "synth", "room", "-o", str(work / "world"), *size, "-q")
+    for name in ("upstairs", "cellar"):
+        shutil.copytree(work / "world" / "robot0", work / name)
+    mapped = subprocess.run([program, "map", "upstairs", "cellar", "-o", "both", "-q"], cwd=work, capture_output=True, text=True)
+    assert mapped.returncode == 0, mapped.stderr
 
 
 class Terminal:
@@ -163,6 +176,8 @@ def main(program, work, case):
         return SKIPPED
     shutil.rmtree(work, ignore_errors=True)
     (work / "a_recording").mkdir(parents=True)
+    if case != "man":
+        map_two_robots(program, work)
     check = {"man": check_pages, "bash": check_bash, "zsh": check_zsh, "fish": check_fish}[case]
     problems = check(program, work)
     print("\n".join([*problems, f"{case}: {len(problems)} problems"]))
@@ -170,4 +185,4 @@ def main(program, work, case):
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1], Path(sys.argv[2]).resolve(), sys.argv[3]))
+    sys.exit(main(str(Path(sys.argv[1]).resolve()), Path(sys.argv[2]).resolve(), sys.argv[3]))
