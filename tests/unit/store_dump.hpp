@@ -23,10 +23,12 @@ inline std::vector<std::string> dump(const std::filesystem::path& file) {
     sqlite3_finalize(statement);
   };
   std::vector<std::string> tables;
-  rows("SELECT name FROM sqlite_master WHERE type = 'table' AND name != 'seen' ORDER BY name",
-       [&](sqlite3_stmt* s) {
-         tables.emplace_back(reinterpret_cast<const char*>(sqlite3_column_text(s, 0)));
-       });
+  rows(
+      "SELECT name FROM sqlite_master WHERE type = 'table' AND name NOT IN ('seen', 'picture') "
+      "ORDER BY name",
+      [&](sqlite3_stmt* s) {
+        tables.emplace_back(reinterpret_cast<const char*>(sqlite3_column_text(s, 0)));
+      });
   for (const std::string& table : tables) {
     rows("SELECT * FROM " + table + " ORDER BY 1, 2, 3", [&](sqlite3_stmt* s) {
       std::string line = table;
