@@ -124,6 +124,13 @@ plumbline render /tmp/room -o /tmp/room.png
 plumbline report /tmp/room
 test -s /tmp/room/map.ply && test -s /tmp/room.png && test -s /tmp/room/report.html
 """
+DEMO = """
+cd /packages/source && scripts/demo --package /packages/world/robot0 | tee /tmp/said
+head -n 3 /tmp/said | grep -q "this will install the package"
+grep -q "a picture: demo/robot0/snapshots/iso.png" /tmp/said
+test -s demo/robot0/snapshots/iso.png && test -s demo/robot0/report.html && test -x /usr/bin/plumbline
+rm -r demo
+"""
 MISSING = """
 plumbline hub -o /tmp/hub --interface lo --robots 1 2>&1 | tee /tmp/said || true
 grep -q "install the package plumbline-net" /tmp/said
@@ -161,6 +168,17 @@ def space_for(gigabytes, work):
     return shutil.disk_usage(work).free > gigabytes * 1e9
 
 
+def try_demo(root, build, debian):
+    """scripts/demo --package in a copy of the source that nothing was built in: the package is installed, not compiled."""
+    source = debian.folder / "packages" / "source"
+    shutil.copytree(root / "scripts", source / "scripts")
+    shutil.copytree(build / "packages", source / "build" / "release" / "packages",
+                    ignore=lambda _d, names: [name for name in names if not name.startswith("plumbline_")])
+    run(build / "bin" / "plumbline", "synth", "room", "-o", debian.folder / "packages" / "world", "--frames", 30,
+        "--width", 320, "--height", 240, "-q")
+    debian.run(DEMO)
+
+
 def try_consumer(root, debian):
     """A project of its own finds the library."""
     shutil.copytree(root / "tests" / "consumer", debian.folder / "packages" / "consumer")
@@ -185,6 +203,8 @@ def try_packages(root, build, work, debian):
     debian.run(MAP)
     print(f"installed in {installed - begin:.0f} s, from there to picture and report {time.monotonic() - installed:.0f} s")
     debian.run(MISSING)
+    debian.apt("remove -y -qq plumbline")
+    try_demo(root, build, debian)
     debian.apt("install -y -qq --allow-downgrades /packages/lower/*.deb")
     debian.apt(f"install -y -qq $(ls /packages/*.deb | grep -v {DEVELOPMENT})")
     debian.run("dpkg-query -W -f '${Version}\\n' plumbline plumbline-net python3-plumbline | { ! grep before; }")
