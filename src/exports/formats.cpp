@@ -3,6 +3,10 @@
 
 namespace plumbline::exports {
 
+void note_colorless(const cloud::CloudFile& file, ExportSummary& summary) {
+  if (!file.has_color) summary.notes.emplace_back("the cloud has no colour: all points are white");
+}
+
 const std::vector<Format>& formats() {
   static const std::vector<Format> kTable{
       colmap_format(), nerfstudio_format(), grid_format(),  las_format(),   glb_format(),

@@ -22,6 +22,9 @@ struct Format {
   core::Result<ExportSummary> (*write)(MapSource& source, const std::filesystem::path& output);
 };
 
+/// Says so if a cloud has no colour: these formats cannot leave it out.
+void note_colorless(const cloud::CloudFile& file, ExportSummary& summary);
+
 /// By what users need most.
 const std::vector<Format>& formats();
 /// Options that all formats take.

@@ -25,6 +25,7 @@ struct GlbData {
   std::vector<std::array<float, 3>> normals;  ///< empty for points
   std::vector<std::array<std::uint16_t, 4>> colors;
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< empty: points
+  std::array<double, 3> shift{};  ///< of all positions: large coordinates, too long for floats
 };
 
 /// Linear light of each sRGB value (IEC 61966-2-1), in 65535ths.
@@ -49,6 +50,7 @@ core::Result<GlbData> points_as_glb(MapSource& source) {
   if (!cloud) return tl::unexpected(cloud.error());
   const std::array<std::uint16_t, 256> light = linear_light();
   GlbData data;
+  data.shift = y_up((*cloud)->shift.x(), (*cloud)->shift.y(), (*cloud)->shift.z());
   for (const cloud::Point& p : *(*cloud)->cloud) {
     data.positions.push_back(y_up(p.x, p.y, p.z));
     data.colors.push_back({light[p.r], light[p.g], light[p.b], 65535});
@@ -77,6 +79,7 @@ core::Result<GlbData> mesh_as_glb(MapSource& source) {
   }
 
   data.triangles = mesh->triangles;
+  data.shift = y_up(mesh->shift[0], mesh->shift[1], mesh->shift[2]);
   return data;
 }
 
@@ -106,6 +109,7 @@ Json glb_json(const GlbData& data, const std::string& name, const std::string& f
   json["scene"] = 0;
   json["scenes"] = Json::array({{{"nodes", {0}}}});
   json["nodes"] = Json::array({{{"name", name}, {"mesh", 0}}});
+  if (data.shift != std::array<double, 3>{}) json["nodes"][0]["translation"] = data.shift;
 
   std::size_t offset = 0;
   const auto add = [&](std::size_t bytes, int target, Json accessor) {
@@ -186,6 +190,7 @@ core::Result<ExportSummary> write_glb(MapSource& source, const std::filesystem::
 
   ExportSummary summary;
   summary.written = {output};
+  if (const auto cloud = source.cloud()) note_colorless(**cloud, summary);
   if (const auto up = source.need_upright(output.string()); !up) summary.notes.push_back(up.error().message);
   return summary;
 }

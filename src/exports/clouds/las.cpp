@@ -208,7 +208,7 @@ core::Result<ExportSummary> write_las(MapSource& source, const std::filesystem::
   if (!layout.extras.empty()) put_extra_records(out, layout.extras);
   put_las_points(out, file, steps);
   ExportSummary summary;
-  if (!file.has_color) summary.notes.emplace_back("the cloud has no colour: all points are white");
+  note_colorless(file, summary);
   if (auto written = out.commit(); !written) return tl::unexpected(written.error());
 
   summary.written = {output};

@@ -16,6 +16,7 @@ core::Result<ExportSummary> write_mesh_file(MapSource& source, const std::filesy
   if (auto written = cloud::write_mesh(output, *mesh); !written) return tl::unexpected(written.error());
   ExportSummary summary;
   summary.written = {output};
+  if (const auto cloud = source.cloud()) note_colorless(**cloud, summary);
   summary.notes.push_back(fmt::format("{} triangles", mesh->triangles.size()));
   return summary;
 }

@@ -40,6 +40,7 @@ core::Result<ExportSummary> write_pcd_cloud(MapSource& source, const std::filesy
   if (!written) return tl::unexpected(written.error());
   ExportSummary summary;
   summary.written = {output};
+  note_colorless(file, summary);
   return summary;
 }
 

@@ -50,6 +50,7 @@ core::Result<ExportSummary> write_ply_cloud(MapSource& source, const std::filesy
   auto written = source.options().ascii
                      ? write_ascii_ply(output, file, comments)
                      : cloud::write_ply(output, *file.cloud, file.columns, file.shift, comments);
+  note_colorless(file, summary);
   if (written && *reference) written = write_georeference(output, **reference);
   if (!written) return tl::unexpected(written.error());
 

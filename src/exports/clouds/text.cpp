@@ -19,6 +19,7 @@ core::Result<ExportSummary> write_text_cloud(MapSource& source, const std::files
   if (auto written = out.commit(); !written) return tl::unexpected(written.error());
   ExportSummary summary;
   summary.written = {output};
+  note_colorless(**cloud, summary);
   return summary;
 }
 

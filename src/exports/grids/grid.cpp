@@ -94,12 +94,16 @@ class RayCounter {
   std::vector<std::uint8_t> counts_;
 };
 
-/// Empty cells over all points, with two of margin.
-core::Result<Grid> grid_over(const cloud::CloudFile& file, double resolution_m) {
+/// Empty cells over all points and the cameras' path, with two of margin: a robot starts where it filmed,
+/// which may lie beyond everything that it saw.
+core::Result<Grid> grid_over(const cloud::CloudFile& file, const std::vector<ExportPose>& path,
+                             double resolution_m) {
   constexpr double kMostCells = 268435456.0;
   Eigen::AlignedBox2d box;
   for (const cloud::Point& p : *file.cloud)
     box.extend((p.getVector3fMap().cast<double>() + file.shift).head<2>().eval());
+  for (const ExportPose& pose : path) box.extend(pose.world_from_camera.translation.head<2>().eval());
+
   Grid grid;
   grid.resolution_m = resolution_m;
 
@@ -142,7 +146,10 @@ core::Result<Grid> make_grid(MapSource& source) {
     return core::usage_error("--heights: takes two heights over the floor, the lower first");
   const auto cloud = source.cloud();
   if (!cloud) return tl::unexpected(cloud.error());
-  auto grid = grid_over(**cloud, options.resolution_m > 0.0 ? options.resolution_m : kGridDefault_m);
+
+  const auto path = source.poses(false);  // none may be selected
+  auto grid = grid_over(**cloud, path ? *path : std::vector<ExportPose>{},
+                        options.resolution_m > 0.0 ? options.resolution_m : kGridDefault_m);
   if (!grid) return grid;
 
   const double low_m = source.floor_m() + options.heights[0];

@@ -38,6 +38,28 @@ Eigen::Vector3d position_of(const cloud::Point& point, const cloud::CloudFile& f
   return point.getVector3fMap().cast<double>() + file.shift;
 }
 
+bool is_component(const maps::MapPlace& place) {
+  return place.result && place.result->folder.parent_path().filename() == "components";
+}
+
+/// A map that never joined the rest of its run: files in a folder of its own below components/.
+std::optional<maps::MapPlace> find_component(const fs::path& input) {
+  fs::path folder = fs::absolute(input).lexically_normal();
+  if (!folder.has_filename()) folder = folder.parent_path();
+
+  maps::MapPlace place;
+  place.result = maps::ResultFolder{folder};
+  std::error_code ec;
+  if (!is_component(place) || !fs::is_regular_file(place.result->trajectory(), ec)) return std::nullopt;
+  return place;
+}
+
+/// Why nothing is left to be written.
+const char* cause_of_nothing(const ExportOptions& options) {
+  const bool whole = options.box.empty() && options.z.empty() && options.storey < 0;
+  return whole ? "the map is empty" : "choose a larger --box, --z or --storey";
+}
+
 /// Points that `keep` selects, with their columns.
 template <typename Keep>
 cloud::CloudFile picked(const cloud::CloudFile& file, const Keep& keep) {
@@ -116,8 +138,14 @@ core::Result<MapSource> MapSource::open(const ExportRequest& request, const core
 
 core::Result<void> MapSource::open_map() {
   auto place = maps::find_map(request_->input);
-  if (!place) return tl::unexpected(place.error());
-  place_ = std::move(*place);
+  if (place) {
+    place_ = std::move(*place);
+  } else if (auto component = find_component(request_->input)) {
+    place_ = std::move(*component);
+  } else {
+    return tl::unexpected(place.error());
+  }
+
   place_.robot = request_->robot;
   upright_ = place_.result.has_value();
   if (place_.store.empty()) return {};
@@ -215,9 +243,19 @@ std::string MapSource::name() const {
 
 core::Result<const maps::StoredResult*> MapSource::store(const std::string& what) const {
   if (store_) return &*store_;
-  return core::input_error(fmt::format(
-      "{}: {} has no map.db, and {} is taken from there; map the recording again without store.enabled=off",
-      request_->output.string(), request_->input.string(), what));
+  if (is_component(place_)) {
+    return core::input_error(
+        fmt::format("{}: {} did not join the map of its run, and only that map has {}; this one "
+                    "gives clouds, meshes, plans, paths, lines and pages",
+                    request_->output.string(), request_->input.string(), what));
+  }
+  if (cloud_only_) {
+    return core::input_error(fmt::format("{}: {} is a cloud, and only a map has {}; name its result folder",
+                                         request_->output.string(), request_->input.string(), what));
+  }
+  return core::input_error(
+      fmt::format("{}: {} has no map.db, which holds {}; map the recording again without store.enabled=off",
+                  request_->output.string(), request_->input.string(), what));
 }
 
 core::Result<void> MapSource::need_upright(const std::string& what) const {
@@ -276,11 +314,8 @@ core::Result<const cloud::CloudFile*> MapSource::cloud() {
   chosen_ = picked(**whole, [&](const Eigen::Vector3d& p) { return selected_.contains(p); });
   whole_.reset();
   if (chosen_->cloud->empty()) {
-    return core::input_error(fmt::format("{}: no point of the cloud is left to be written{}",
-                                         request_->input.string(),
-                                         options().box.empty() && options().z.empty() && options().storey < 0
-                                             ? "; the map is empty"
-                                             : "; choose a larger --box, --z or --storey"));
+    return core::input_error(fmt::format("{}: no point of the cloud is left to be written; {}",
+                                         request_->input.string(), cause_of_nothing(options())));
   }
   return &*chosen_;
 }
@@ -342,8 +377,8 @@ core::Result<std::vector<ExportPose>> MapSource::poses(bool keyframes_only) cons
                             [&](const ExportPose& p) { return !selects(p.world_from_camera.translation); }),
              all->end());
   if (all->empty()) {
-    return core::input_error(
-        fmt::format("{}: no pose of the camera is left to be written", request_->input.string()));
+    return core::input_error(fmt::format("{}: no pose of the camera is left to be written; {}",
+                                         request_->input.string(), cause_of_nothing(options())));
   }
   std::stable_sort(all->begin(), all->end(), [](const ExportPose& a, const ExportPose& b) {
     return a.robot != b.robot ? a.robot < b.robot : a.stamp < b.stamp;

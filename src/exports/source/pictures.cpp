@@ -209,7 +209,9 @@ core::Result<sensor::RgbdFrame> Pictures::read(std::int32_t robot, std::size_t f
 std::unique_ptr<Pictures> open_pictures(const MapSource& source, ExportSummary& summary) {
   auto pictures = Pictures::open(source);
   if (pictures) return std::make_unique<Pictures>(std::move(*pictures));
-  summary.notes.push_back("poses only, without pictures: " + pictures.error().message);
+  const bool named = !source.request().recordings.empty();
+  summary.notes.push_back("poses only, without pictures: " + pictures.error().message +
+                          (named ? "" : "; if the recording lies elsewhere now, name it with --recording"));
   return nullptr;
 }
 

@@ -58,6 +58,17 @@ TEST_F(Components, WhatNeverJoinsStaysApartAndIsSaid) {
     ASSERT_TRUE(way) << way.error().message;
     EXPECT_EQ(way->size(), one["frames"].get<std::size_t>());
     EXPECT_FALSE(one["why_not"].get<std::string>().empty());
+
+    const std::string map = "export '" + path(folder).string() + "' -o ";
+    EXPECT_EQ(run(map + "apart.las").code, 0);
+    ASSERT_EQ(run(map + "apart.txt --what trajectory").code, 0);
+    const auto path_apart = dataset::read_trajectory(path("apart.txt"));
+    ASSERT_TRUE(path_apart) << path_apart.error().message;
+    EXPECT_EQ(path_apart->size(), way->size());
+    const Outcome grid = run(map + "apart.yaml");
+    EXPECT_EQ(grid.code, 3) << grid;
+    EXPECT_TRUE(grid.told("did not join the map of its run")) << grid;
+    EXPECT_FALSE(fs::exists(path("apart.yaml")));
   }
   EXPECT_EQ(apart, 1U);
 

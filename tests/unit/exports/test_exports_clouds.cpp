@@ -83,6 +83,36 @@ TEST_F(ExportCloud, GlbIsYUp) {
   EXPECT_EQ(at<std::uint16_t>(glb, binary + 4 * 12 + 8), 65535) << "255 is full light";
 }
 
+TEST_F(ExportCloud, GlbKeepsLargeCoordinates) {
+  cloud::Cloud cloud;
+  cloud.push_back(point(0, 0, 0));
+  cloud.push_back(point(1, 2, 3));
+  const Eigen::Vector3d far(391000.0, 5817000.0, 34.0);
+  ASSERT_TRUE(cloud::write_ply(path("cloud.ply"), cloud, {}, far));
+
+  ASSERT_TRUE(write(request("out.glb")));
+
+  const std::string glb = bytes("out.glb");
+  const auto length = at<std::uint32_t>(glb, 12);
+  const auto json = nlohmann::json::parse(glb.substr(20, length));
+  const auto moved = json["nodes"][0]["translation"];
+  const std::size_t second = 20 + length + 8 + 12;
+  EXPECT_NEAR(moved[0].get<double>() + at<float>(glb, second), 391001.0, 1e-6);
+  EXPECT_NEAR(moved[1].get<double>() + at<float>(glb, second + 4), 37.0, 1e-6) << "y is up";
+  EXPECT_NEAR(moved[2].get<double>() + at<float>(glb, second + 8), -5817002.0, 1e-6);
+}
+
+TEST_F(ExportCloud, SaysThatThereIsNoColor) {
+  std::ofstream(path("cloud.ply")) << "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty "
+                                      "float y\nproperty float z\nend_header\n1 2 3\n";
+  for (const char* output : {"out.las", "out.glb", "out.ply", "out.pcd", "out.csv", "out.xyz"}) {
+    const auto summary = write(request(output));
+    ASSERT_TRUE(summary) << output << ": " << summary.error().message;
+    ASSERT_EQ(summary->notes.size(), 1U) << output;
+    EXPECT_NE(summary->notes.front().find("no colour"), std::string::npos) << output;
+  }
+}
+
 TEST_F(ExportCloud, ChoosesAPart) {
   ExportRequest wanted = request("out.csv");
   wanted.options.z = {-0.5, 2.0};
