@@ -466,12 +466,13 @@ def office_truth(case, spacing):
 
 
 def case_viewer_width(case):
-    """The door of 0.95 m at 5.45 m of the wall from (14, 1.86) to (0, 1.86), measured between its jambs."""
+    """The clear width of a door: its opening of 0.95 m begins at 5.45 m of the wall from (14, 1.86) to (0, 1.86), and its
+    frame covers 1 cm of it on each side."""
     page = case.work / "office.html"
     page.unlink(missing_ok=True)
     run(case.program, "export", office_truth(case, "1cm"), "-o", page)
-    x = 14.0 - 5.45
-    viewer("width", page, x - 0.475, 1.86, 1.0, x + 0.475, 1.86, 1.0, 0.95)
+    near, far = 14.0 - 5.45 - 0.01, 14.0 - 5.45 - 0.95 + 0.01
+    viewer("width", page, far, 1.86, 1.0, near, 1.86, 1.0, near - far)
 
 
 def case_viewer_large(case):
