@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Has programs that others wrote judge what plumbline exports: run_judge.py PROGRAM WORK MAP CASE [OCTREE_PROBE]
 
-MAP is room (a generated world) or kitchen (7-Scenes' of PLUMBLINE_DATA). The cases share their maps, which the
+MAP is room, office (generated worlds) or kitchen (7-Scenes' of PLUMBLINE_DATA). The cases share their maps, which the
 first one makes in WORK. Exit code 77: the judge is not installed (scripts/install-deps --judges), or there is no
 recording.
 """
@@ -19,9 +19,12 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 JUDGES = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "plumbline/judges/node_modules"
+SCENES = HERE.parents[2] / "pipelines/scenes"
 SYSTEM_PYTHON = "/usr/bin/python3"  # Debian's modules are its
+OFFICE = {"fps": 10, "width": 320, "height": 240, "seed": 1}
 RECORDINGS = {
     "room": "synth:room?frames=200&width=320&height=240",
+    "office": "synth:office?" + "&".join(f"{key}={value}" for key, value in {"frames": 500, **OFFICE}.items()),
 }
 
 
@@ -412,8 +415,19 @@ def case_dxf(case):
 
 
 def need_ezdxf():
-    if subprocess.run([SYSTEM_PYTHON, "-c", "import ezdxf"], capture_output=True).returncode != 0:
+    if subprocess.run([SYSTEM_PYTHON, "-c", "import ezdxf, numpy, yaml"], capture_output=True).returncode != 0:
         raise Absent("python3-ezdxf is not installed; scripts/install-deps --judges installs it")
+
+
+def case_truth(case):
+    """The plan of the generated office against its scene file: walls, their lengths, doors."""
+    need_ezdxf()
+    start = case.work / "start"  # where the camera began, in the scene's frame
+    shutil.rmtree(start, ignore_errors=True)
+    run(case.program, "synth", "office", "-o", start, "--frames", 2, "--width", 64, "--height", 48,
+        "--fps", OFFICE["fps"], "--seed", OFFICE["seed"], "--reference-spacing", "0.5", "-q")
+    print(run(SYSTEM_PYTHON, HERE / "judge_plan.py", case.export("truth.dxf"), SCENES / "office.yaml",
+              start / "scene.json", case.map / "trajectory.txt").strip())
 
 
 def case_clouds(case):
