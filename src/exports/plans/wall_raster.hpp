@@ -24,6 +24,7 @@ class WallRaster {
 
   [[nodiscard]] int columns() const { return columns_; }
   [[nodiscard]] int column_of(double s) const;
+  [[nodiscard]] int column_at(const Eigen::Vector2d& place) const { return column_of(along_.dot(place)); }
   [[nodiscard]] double start_of(int column) const { return first_s_ + column * kWidth_m; }
   /// Share of the cells between two heights that show surface, or that rays cross.
   [[nodiscard]] double seen(int column, double low_m, double high_m) const {

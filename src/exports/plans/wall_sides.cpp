@@ -72,7 +72,7 @@ double wall_height(const evaluate::SurfaceSamples& samples, double floor_m) {
 /// The line on which most points lie: the most frequent distance, then least squares near it.
 void fit_line(const std::vector<Eigen::Vector2d>& places, WallLine& line) {
   constexpr double kBin_m = 0.001;
-  constexpr double kNear_m = 0.008;
+  constexpr std::array<double, 5> kNear_m{0.03, 0.015, 0.008, 0.008, 0.008};
   constexpr int kBins = 2 * static_cast<int>(kWallSlab_m / kBin_m) + 1;
   std::array<int, kBins> bins{};
   for (const Eigen::Vector2d& p : places) {
@@ -93,13 +93,13 @@ void fit_line(const std::vector<Eigen::Vector2d>& places, WallLine& line) {
 
   line.offset_m += best * kBin_m - kWallSlab_m;
 
-  for (int pass = 0; pass < 3; ++pass) {
+  for (const double near_m : kNear_m) {
     const Eigen::Vector2d along = line.along();
     double n = 0.0, s_sum = 0.0, h_sum = 0.0, ss = 0.0, sh = 0.0;
 
     for (const Eigen::Vector2d& p : places) {
       const double h = line.normal.dot(p) - line.offset_m;
-      if (std::abs(h) > kNear_m) continue;
+      if (std::abs(h) > near_m) continue;
       const double s = along.dot(p);
       n += 1.0;
       s_sum += s;
@@ -160,12 +160,41 @@ RunLook look_of(const WallRaster& raster, const std::pair<int, int>& run, double
   return look;
 }
 
-bool is_wall(const WallRaster& raster, const std::pair<int, int>& run, double need_m, double cut_m) {
-  constexpr double kLeastHigh = 0.2;
+bool is_tall(const WallRaster& raster, const std::pair<int, int>& run, double cut_m) {
+  constexpr double kTall_m = 1.6;  // cameras that are held look down, and see little above this
+  constexpr double kLeastTall = 0.2;
   constexpr double kLeastAtCut = 0.1;
-  const RunLook look = look_of(raster, run, need_m, cut_m);
-  return (run.second - run.first + 1) * WallRaster::kWidth_m >= kShortestWall_m && look.high >= kLeastHigh &&
+  const RunLook look = look_of(raster, run, kTall_m, cut_m);
+  return (run.second - run.first + 1) * WallRaster::kWidth_m >= kShortestWall_m && look.high >= kLeastTall &&
          look.at_cut > kLeastAtCut;
+}
+
+/// Points of the slab around a line that face as it does.
+std::vector<Eigen::Vector3d> points_on(const evaluate::SurfaceSamples& samples, const WallLine& line) {
+  const Eigen::Vector3f facing(static_cast<float>(line.normal.x()), static_cast<float>(line.normal.y()),
+                               0.0F);
+  std::vector<Eigen::Vector3d> own;
+  for (std::size_t i = 0; i < samples.points.size(); ++i) {
+    const Eigen::Vector3d p = samples.points[i].cast<double>();
+    if (std::abs(line.normal.dot(p.head<2>()) - line.offset_m) < kWallSlab_m &&
+        samples.normals[i].dot(facing) > kWallAlike)
+      own.push_back(p);
+  }
+  return own;
+}
+
+/// Fits the line to all its points.
+void align_with_points(const std::vector<Eigen::Vector3d>& points, WallLine& line) {
+  std::vector<Eigen::Vector2d> places;
+  for (const Eigen::Vector3d& p : points) places.emplace_back(p.head<2>());
+  const Eigen::Vector2d along = line.along();
+  const auto earlier = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+    return along.dot(a) < along.dot(b);
+  };
+  const auto [first, last] = std::minmax_element(places.begin(), places.end(), earlier);
+  line.s0 = along.dot(*first);
+  line.s1 = along.dot(*last);
+  fit_line(places, line);
 }
 
 /// The walls on one plane.
@@ -174,16 +203,12 @@ std::vector<Side> sides_on(const evaluate::SurfaceSamples& samples, const evalua
   WallLine base;
   base.normal = plane.normal.head<2>().normalized();
   base.offset_m = plane.offset_m / plane.normal.head<2>().norm();
+  const std::vector<Eigen::Vector3d> first = points_on(samples, base);
+  if (first.empty()) return {};
 
-  const Eigen::Vector3f facing(static_cast<float>(base.normal.x()), static_cast<float>(base.normal.y()),
-                               0.0F);
-  std::vector<Eigen::Vector3d> own;
-  for (std::size_t i = 0; i < samples.points.size(); ++i) {
-    const Eigen::Vector3d p = samples.points[i].cast<double>();
-    if (std::abs(base.normal.dot(p.head<2>()) - base.offset_m) < kWallSlab_m &&
-        samples.normals[i].dot(facing) > kWallAlike)
-      own.push_back(p);
-  }
+  // A plane of a few patches is a little askew: at the far end of a long wall that is more than the slab.
+  align_with_points(first, base);
+  std::vector<Eigen::Vector3d> own = points_on(samples, base);
   if (own.empty()) return {};
 
   const Eigen::Vector2d along = base.along();
@@ -197,7 +222,7 @@ std::vector<Side> sides_on(const evaluate::SurfaceSamples& samples, const evalua
 
   std::vector<Side> sides;
   for (const auto& run : filled_runs(raster)) {
-    if (!is_wall(raster, run, need_m, cut_m)) continue;
+    if (!is_tall(raster, run, cut_m)) continue;
     Side side;
     side.line = base;
 
@@ -211,6 +236,7 @@ std::vector<Side> sides_on(const evaluate::SurfaceSamples& samples, const evalua
     side.line.s0 = along.dot(places.front());
     side.line.s1 = along.dot(places.back());
     for (int c = run.first; c <= run.second; ++c) side.line.top_m = std::max(side.line.top_m, raster.top(c));
+    side.line.high = look_of(raster, run, need_m, cut_m).high;
     side.points = places.size();
     fit_line(places, side.line);
     sides.push_back(side);
@@ -233,6 +259,24 @@ bool covers(const WallLine& large, const WallLine& small) {
 }
 
 }  // namespace
+
+void fit_sides(const cloud::CloudFile& file, double floor_m, const core::Executor& executor,
+               std::vector<WallLine>& walls) {
+  const evaluate::SurfaceSamples samples = upright_samples(file, floor_m);
+  executor.parallel_for(walls.size(), [&](std::size_t i) {
+    WallLine& wall = walls[i];
+    std::vector<Eigen::Vector2d> places;
+    for (const Eigen::Vector3d& p : points_on(samples, wall)) {
+      const double s = wall.along().dot(p.head<2>());
+      if (s >= wall.s0 && s <= wall.s1) places.emplace_back(p.head<2>());
+    }
+
+    const WallLine before = wall;
+    fit_line(places, wall);
+    for (WallOpening& opening : wall.openings)
+      opening = {wall.along().dot(before.at(opening.s0)), wall.along().dot(before.at(opening.s1))};
+  });
+}
 
 std::vector<WallLine> wall_sides(const cloud::CloudFile& file, double floor_m, double cut_m,
                                  const core::Executor& executor) {

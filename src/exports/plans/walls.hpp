@@ -23,6 +23,7 @@ struct WallLine {
   double s0 = 0.0;
   double s1 = 0.0;
   double top_m = 0.0;                   ///< that was seen of it, over the floor
+  double high = 0.0;                    ///< share of its length that was seen up to where furniture ends
   std::vector<WallOpening> openings;    ///< in order, apart
   std::array<int, 2> corner{-1, -1};    ///< the line that its first and its last end meet; -1: none
   std::array<int, 2> corner_end{0, 0};  ///< which end of that line; 2: somewhere along it
@@ -59,12 +60,16 @@ core::Result<WallPlan> find_walls(MapSource& source);
 
 // Steps of it.
 
-/// Sides of walls that the cloud shows, without openings and corners.
+/// Sides of walls that the cloud shows, without openings and corners; tall furniture is among them.
 std::vector<WallLine> wall_sides(const cloud::CloudFile& file, double floor_m, double cut_m,
                                  const core::Executor& executor);
+/// Fits each line again to all points of the cloud between its ends.
+void fit_sides(const cloud::CloudFile& file, double floor_m, const core::Executor& executor,
+               std::vector<WallLine>& walls);
 /// Lets ends meet where lines cross.
 void join_corners(std::vector<WallLine>& walls);
-std::vector<WallDoor> doors_of(const std::vector<WallLine>& walls);
+/// Openings of a wall's two sides that are one door become equally wide where a leaf hid a part of one.
+std::vector<WallDoor> doors_of(std::vector<WallLine>& walls);
 std::vector<WallRoom> rooms_of(const std::vector<WallLine>& walls);
 
 }  // namespace plumbline::exports

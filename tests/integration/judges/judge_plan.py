@@ -178,7 +178,7 @@ def main():
     print(f"offsets mm: median {1e3 * np.median(np.abs(offs)):.1f}, largest {1e3 * np.abs(offs).max():.1f}")
     print(f"lengths of {len(lengths)} walls from corner to corner, mm off: {(1e3 * lengths).round(1).tolist()}")
     print(f"doors: {len(found & passed)} of {len(passed)} that the camera went through ({len(found)} of {len(doors)}"
-          f" in the scene), invented {invented}")
+          f" in the scene), missing {[doors[k][0].round(2).tolist() for k in sorted(passed - found)]}, invented {invented}")
     wrong = []
     if np.abs(offs).max() > WALL_M:
         wrong.append(f"a wall is {1e3 * np.abs(offs).max():.1f} mm off")

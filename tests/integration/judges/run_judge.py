@@ -21,10 +21,10 @@ HERE = Path(__file__).resolve().parent
 JUDGES = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "plumbline/judges/node_modules"
 SCENES = HERE.parents[2] / "pipelines/scenes"
 SYSTEM_PYTHON = "/usr/bin/python3"  # Debian's modules are its
-OFFICE = {"fps": 10, "width": 320, "height": 240, "seed": 1}
+OFFICE = {"fps": 10, "seed": 1}
 RECORDINGS = {
     "room": "synth:room?frames=200&width=320&height=240",
-    "office": "synth:office?" + "&".join(f"{key}={value}" for key, value in {"frames": 500, **OFFICE}.items()),
+    "office": "synth:office?" + "&".join(f"{key}={value}" for key, value in OFFICE.items()),
 }
 
 
