@@ -94,6 +94,9 @@ std::string shortened(const std::string& text, const std::string& kind) {
       const bool needed = kind == "css" && std::string(">+~{}:;,()").find(c) == std::string::npos &&
                           std::string("{};:,>").find(last) == std::string::npos;
       if (script && c == '}' && last == ';') out.pop_back();
+      // Before these a line's end ends no statement that they would continue otherwise.
+      if (script && last == '\n' && out.size() > 1 && std::string("}).]").find(c) != std::string::npos)
+        out.pop_back();
       if (blank && last != '\n' && (sticks(last, c) || needed || (kind == "css" && (c == ':' || c == '('))))
         out += ' ';
       out += word ? "let" : text.substr(i, to - i);

@@ -37,7 +37,7 @@ function listen(panel) {
     if (news.told) panel.say(news.told);
     if (news.done) {
       source.close();
-      panel.say('the run has ended; this is what was seen of its map');
+      panel.say('the run has ended; this is its map');
     }
   };
   source.onerror = () => panel.say('nothing is heard of the run; trying again');

@@ -3,16 +3,16 @@
 const kHelp = [
   ['Drag', 'turn; in the top view move'],
   ['Right button, Shift, two fingers', 'move'],
-  ['Wheel, pinch, + −', 'nearer to the pointer (in a report click first)'],
+  ['Wheel, pinch, + −', 'nearer (in a report click first)'],
   ['Double click', 'the new middle'],
   ['W A S D, Q E', 'walk, lower, higher; three fingers walk'],
   ['Arrows, with Shift', 'turn, move'],
   ['1, 2, 3', 'orbit, walk, top view'],
   ['Home', 'the whole map'],
-  ['Click', 'coordinates, and the picture that saw it best'],
-  ['M, Enter, Backspace', 'next tool, end of a line, take the last away'],
+  ['Click', 'coordinates, the best picture'],
+  ['M, Enter, Backspace', 'next tool, end a line, undo'],
   ['Space', 'a click in the middle of the picture'],
-  ['C', 'next cut: none, heights, box; drag its handles'],
+  ['C', 'next cut; drag its handles'],
   ['L', 'next colouring'],
   ['X', 'the other map'],
   ['P', 'fly along the path, stop'],
@@ -453,7 +453,7 @@ class Panel {
       this.hear('measured');
       if (s.l !== 'photo') view.setLayer(s.l);
     } catch (e) {
-      this.say('the link is damaged: here is the whole map');
+      this.say('damaged link: here is the whole map');
     }
   }
 }
