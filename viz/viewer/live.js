@@ -40,5 +40,5 @@ function listen(panel) {
       panel.say('the run has ended; this is its map');
     }
   };
-  source.onerror = () => panel.say('nothing is heard of the run; trying again');
+  source.onerror = () => panel.say('no word of the run; trying again');
 }

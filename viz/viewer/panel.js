@@ -5,7 +5,7 @@ const kHelp = [
   ['Right button, Shift, two fingers', 'move'],
   ['Wheel, pinch, + −', 'nearer (in a report click first)'],
   ['Double click', 'the new middle'],
-  ['W A S D, Q E', 'walk, lower, higher; three fingers walk'],
+  ['W A S D, Q E', 'walk, lower, higher; or 3 fingers'],
   ['Arrows, with Shift', 'turn, move'],
   ['1, 2, 3', 'orbit, walk, top view'],
   ['Home', 'the whole map'],
