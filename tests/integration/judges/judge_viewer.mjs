@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// judge_viewer.mjs CASE PAGE.html WORK [NUMBERS]: Debian's Chromium opens the page from disk, without a display, and
+// judge_viewer.mjs CASE PAGE.html WORK [NUMBERS]: Debian's Chromium, or Firefox in the case firefox, opens the page from disk, without a display, and
 // uses it as a person does; what each control does is read from the page. Prints what it saw; exit code 1: something
 // was wrong.
 import { createRequire } from 'module'
@@ -17,6 +17,11 @@ const sleep = (ms) => new Promise((done) => setTimeout(done, ms))
 async function launch(more = []) {
   return puppeteer.launch({ executablePath: '/usr/bin/chromium', headless: true, args: ['--no-sandbox', '--use-angle=swiftshader',
     '--enable-unsafe-swiftshader', '--disable-background-networking', '--disable-component-update', '--disable-sync', '--no-first-run', ...more] })
+}
+
+/** With a window, on xvfb: without one Firefox has no WebGL. */
+async function launchFirefox() {
+  return puppeteer.launch({ browser: 'firefox', executablePath: '/usr/bin/firefox-esr', headless: false, extraPrefsFirefox: { 'webgl.force-enabled': true } })
 }
 
 /** A page that complains of whatever it asks for elsewhere, and of every error. */
@@ -350,6 +355,32 @@ const cases = {
     await page.screenshot({ path: path.join(work, 'width.png') })
     console.log(got.text)
     check(Math.abs(got.value - n[6]) < 0.01, `${got.value} m instead of ${n[6]} m`)
+    await browser.close()
+  },
+
+  /** The main things in Firefox: it draws, turns, walks, measures and restores a view. */
+  async firefox() {
+    const browser = await launchFirefox(), page = await open(browser, { width: 1300, height: 1000 })
+    await rest(page)
+    console.log(`first picture after ${await page.$eval('.pv-canvas', (c) => c.dataset.firstMs)} ms, ${await drawn(page)} points`)
+    check(await drawn(page) > 1000, 'nearly nothing is drawn')
+    await page.screenshot({ path: path.join(work, 'firefox.png') })
+
+    const box = await (await page.$('.pv-canvas')).boundingBox()
+    const middle = [box.x + box.width / 2, box.y + box.height / 2]
+    await changes(page, 'drag', async () => {
+      await page.mouse.move(...middle)
+      await page.mouse.down()
+      await page.mouse.move(middle[0] + 80, middle[1] + 30, { steps: 5 })
+      await page.mouse.up()
+    })
+    await page.focus('.pv-canvas')
+    for (const [key, mode] of [['2', 'walk'], ['3', 'top'], ['1', 'orbit']]) {
+      await changes(page, `key ${key}`, () => page.keyboard.press(key))
+      check((await inPage(page, (v) => v.state())).c[0] === mode, `key ${key} does not lead to ${mode}`)
+    }
+    await changes(page, 'colour by height', () => page.select('.pv-bar select[aria-label="Colour by"]', 'height'))
+    await measuring(page)
     await browser.close()
   },
 

@@ -50,9 +50,9 @@ def run(*command, **more):
     return done.stdout + done.stderr
 
 
-def node(script, *arguments):
+def node(script, *arguments, within=()):
     need("node")
-    return run("node", HERE / script, *arguments, env={**os.environ, "JUDGES": str(JUDGES)})
+    return run(*within, "node", HERE / script, *arguments, env={**os.environ, "JUDGES": str(JUDGES)})
 
 
 def check(condition, message):
@@ -455,13 +455,13 @@ def case_clouds(case):
         check(faces > 1000 and corners > 500, f"{name}: the mesh is almost empty")
 
 
-def viewer(what, page, *numbers):
-    """Debian's Chromium uses a page as a person does."""
-    need("chromium")
+def viewer(what, page, *numbers, browser="chromium", within=()):
+    """A browser of Debian uses a page as a person does."""
+    need(browser)
     need_npm("puppeteer-core")
     work = page.with_suffix("")
     work.mkdir(exist_ok=True)
-    print(node("judge_viewer.mjs", what, page, work, *numbers).strip())
+    print(node("judge_viewer.mjs", what, page, work, *numbers, within=within).strip())
 
 
 def case_viewer(case):
@@ -487,6 +487,12 @@ def case_viewer_width(case):
     run(case.program, "export", office_truth(case, "1cm"), "-o", page)
     near, far = 14.0 - 5.45 - 0.01, 14.0 - 5.45 - 0.95 + 0.01
     viewer("width", page, far, 1.86, 1.0, near, 1.86, 1.0, near - far)
+
+
+def case_viewer_firefox(case):
+    """Firefox needs a display for WebGL, which xvfb is."""
+    display = [need("xvfb-run"), "-a", "-s", "-screen 0 1400x1100x24"]
+    viewer("firefox", case.export("firefox.html"), browser="firefox-esr", within=display)
 
 
 def case_viewer_large(case):
