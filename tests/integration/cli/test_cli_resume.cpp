@@ -172,7 +172,7 @@ TEST_F(ResumeCommand, SeveralRobotsGoOnAsWell) {
 
 TEST_F(ResumeCommand, AFullDiskKeepsWhatWasStored) {
   // The shell's file size limit stands in for the disk's end, in blocks of 1024 bytes (512 in some shells).
-  const Outcome o = run(std::string("map wall -o out") + kCheap, "ulimit -f 1200; ");
+  const Outcome o = run(std::string("map wall -o out") + kCheap, "ulimit -f 2000; ");
   EXPECT_EQ(o.code, 5) << o;
   EXPECT_TRUE(o.told("map.db")) << o;
   EXPECT_TRUE(o.told("--resume")) << o;
