@@ -11,6 +11,7 @@
 #include "plumbline/core/executor.hpp"
 #include "plumbline/core/log.hpp"
 #include "plumbline/core/stop.hpp"
+#include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/net/options.hpp"
 #include "plumbline/pipeline/fuse_maps.hpp"
 
@@ -40,6 +41,9 @@ struct HubRequest {
   bool resume = false;                         ///< continue an interrupted hub from OUT.partial
   std::uint64_t quota_bytes = 20'000'000'000;  ///< of disk for each robot
   std::string fresh_id;                        ///< made up at random, 16 letters or digits
+  /// Receives the pose of a robot's map in the frame that it shares with others, as often as meetings change
+  /// one; may be empty.
+  std::function<void(const std::string& robot, const geometry::Rigid3& shared_from_robot)> placed;
 };
 
 /// Receives a line for people whenever there is something new.

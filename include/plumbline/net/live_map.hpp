@@ -7,12 +7,13 @@
 #include <memory>
 #include <string>
 
+#include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/net/page_server.hpp"
 
 namespace plumbline::net {
 
 /// Serves a page and feeds it from every map.db in a folder, beside the run that writes them. Between two
-/// looks it sleeps twenty times as long as a look took, a second at least.
+/// looks it sleeps ten times as long as a look took, a second at least.
 class LiveMap {
  public:
   /// `output`: OUT of the run; OUT.partial is followed while it is there. Errors as PageServer::start.
@@ -23,6 +24,9 @@ class LiveMap {
   [[nodiscard]] std::string address() const;
   /// One line for people, shown under the map. Thread-safe.
   void tell(const std::string& words);
+  /// The pose of a robot's map in the frame that it shares with others: of the store robots/NAME/map.db.
+  /// Thread-safe.
+  void place(const std::string& robot, const geometry::Rigid3& shared_from_robot);
 
  private:
   struct Impl;

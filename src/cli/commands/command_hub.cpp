@@ -34,6 +34,12 @@ int hub(Session& session, net::HubRequest request, double quota_gb, const std::s
   const auto live = live_map(page, request.fuse.output, console);
   if (!live) return session.fail(live.error());
 
+  if (*live) {
+    request.placed = [&](const std::string& robot, const geometry::Rigid3& shared_from_robot) {
+      (*live)->place(robot, shared_from_robot);
+    };
+  }
+
   const auto summary = net::run_hub(
       request, session.executor(), console, stop_on_signals(),
       [&](const std::string& line) {

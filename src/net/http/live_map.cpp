@@ -89,13 +89,15 @@ struct LiveMap::Impl {
   void look();
   void look_at(const fs::path& store, Json& robots);
   void show(const maps::StoreReader& reader, const maps::StoredMap& map, const std::string& store,
+            const geometry::Rigid3& shared_from_map, const std::map<std::int32_t, std::string>& names,
             std::size_t& budget);
 
   PageServer server;
   fs::path output;
   std::map<std::pair<std::string, core::KeyframeId>, geometry::Rigid3> sent;
-  std::map<std::string, int> colors;  ///< of robots, by name, as they came
-  std::string words;                  ///< of tell()
+  std::map<std::string, int> colors;               ///< of robots, by name, as they came
+  std::string words;                               ///< of tell()
+  std::map<std::string, geometry::Rigid3> places;  ///< of place()
   std::mutex mutex;
   std::condition_variable wake;
   bool ended = false;
@@ -105,7 +107,8 @@ struct LiveMap::Impl {
 
 /// Sends keyframes' clouds that are new or have moved.
 void LiveMap::Impl::show(const maps::StoreReader& reader, const maps::StoredMap& map,
-                         const std::string& store, std::size_t& budget) {
+                         const std::string& store, const geometry::Rigid3& shared_from_map,
+                         const std::map<std::int32_t, std::string>& names, std::size_t& budget) {
   const auto with_cloud = reader.cloud_ids();
   if (!with_cloud) return;
 
@@ -114,24 +117,20 @@ void LiveMap::Impl::show(const maps::StoreReader& reader, const maps::StoredMap&
     if (budget == 0) return;
     const auto key = std::pair(store, keyframe.id);
     const auto before = sent.find(key);
-    const bool known = before != sent.end() && !far_from(before->second, keyframe.world_from_camera);
-    if (known || there.count(keyframe.id) == 0) continue;
+    const geometry::Rigid3 pose = shared_from_map * keyframe.world_from_camera;
+    const bool known = before != sent.end() && !far_from(before->second, pose);
+    if (known || there.count(keyframe.id) == 0 || names.count(keyframe.id.robot) == 0) continue;
 
     const auto cloud = reader.cloud(keyframe.id);
     if (!cloud) continue;
     const std::string name =
         store + "/" + std::to_string(keyframe.id.robot) + "/" + std::to_string(keyframe.id.index);
-    const std::string json = viewer::cloud_json(placed(**cloud, keyframe.world_from_camera), false);
+    const std::string json = viewer::cloud_json(placed(**cloud, pose), false);
 
-    std::string robot_name;
-    for (const maps::RobotInfo& robot : map.header.robots) {
-      if (robot.number == keyframe.id.robot) robot_name = robot.name;
-    }
-
-    server.send("{\"key\":" + Json(name).dump() + ",\"robot\":" + std::to_string(colors[robot_name]) +
-                    ",\"cloud\":" + json + "}",
+    server.send("{\"key\":" + Json(name).dump() + ",\"robot\":" +
+                    std::to_string(colors[names.at(keyframe.id.robot)]) + ",\"cloud\":" + json + "}",
                 name);
-    sent[key] = keyframe.world_from_camera;
+    sent[key] = pose;
     --budget;
   }
 }
@@ -144,26 +143,40 @@ void LiveMap::Impl::look_at(const fs::path& store, Json& robots) {
   const auto each = reader->load_each();
   if (!each) return;
 
+  // A hub's copy is known by its folder, and lies where the hub's meetings have put it.
+  const std::string folder = store.parent_path().filename().string();
+  const bool copy = store.parent_path().parent_path().filename() == "robots";
+  geometry::Rigid3 shared_from_map;
+  if (copy) {
+    const std::lock_guard lock(mutex);
+    if (const auto found = places.find(folder); found != places.end()) shared_from_map = found->second;
+  }
+
+  std::map<std::int32_t, std::string> names;
+  for (const maps::RobotInfo& robot : reader->header().robots)
+    names[robot.number] = copy ? folder : robot.name.empty() ? "robot" : robot.name;
+
   std::size_t budget = at_once;
   for (const maps::StoredMap& map : *each) {
     const auto paths = maps::by_robot(maps::poses_of(map.map, map.frames));
     for (const maps::RobotInfo& robot : map.header.robots) {
-      colors.emplace(robot.name, static_cast<int>(colors.size()));
+      const std::string& name = names.at(robot.number);
+      colors.emplace(name, static_cast<int>(colors.size()));
       const auto path = paths.find(robot.number);
       if (path == paths.end() || path->second.empty()) continue;
 
-      Json places = Json::array();
+      Json way = Json::array();
       for (std::size_t i = 0; i < path->second.size(); i += 1 + path->second.size() / 500)
-        places.push_back(numbers(path->second[i].world_from_camera.translation));
+        way.push_back(numbers(shared_from_map * path->second[i].world_from_camera.translation));
 
-      robots.push_back({{"name", robot.name.empty() ? "robot" : robot.name},
-                        {"number", colors[robot.name]},
-                        {"p", numbers(path->second.back().world_from_camera.translation)},
-                        {"path", std::move(places)},
+      robots.push_back({{"name", name},
+                        {"number", colors[name]},
+                        {"p", numbers(shared_from_map * path->second.back().world_from_camera.translation)},
+                        {"path", std::move(way)},
                         {"keyframes", map.map.keyframe_count()},
                         {"stamp", path->second.back().stamp}});
     }
-    show(*reader, map, store.parent_path().filename().string(), budget);
+    show(*reader, map, folder, shared_from_map, names, budget);
   }
 }
 
@@ -201,7 +214,7 @@ void LiveMap::Impl::follow() {
     look();
     const Clock::duration took = Clock::now() - begin;
     lock.lock();
-    wake.wait_for(lock, std::max<Clock::duration>(std::chrono::seconds(1), 20 * took), [&] { return ended; });
+    wake.wait_for(lock, std::max<Clock::duration>(std::chrono::seconds(1), 10 * took), [&] { return ended; });
   }
 }
 
@@ -238,6 +251,11 @@ LiveMap::~LiveMap() {
 }
 
 std::string LiveMap::address() const { return impl_->server.address(); }
+
+void LiveMap::place(const std::string& robot, const geometry::Rigid3& shared_from_robot) {
+  const std::lock_guard lock(impl_->mutex);
+  impl_->places[robot] = shared_from_robot;
+}
 
 void LiveMap::tell(const std::string& words) {
   const std::lock_guard lock(impl_->mutex);

@@ -35,6 +35,11 @@ SharedFrame shared_frame(const mapping::RobotPlace& from, const std::string& fra
 
 }  // namespace
 
+geometry::Rigid3 pose_of(const SharedFrame& frame) {
+  const std::array<double, 7>& p = frame.frame_from_robot;
+  return {Eigen::Quaterniond(p[6], p[3], p[4], p[5]), Eigen::Vector3d(p[0], p[1], p[2])};
+}
+
 HubMeetings::HubMeetings(std::filesystem::path folder, const core::Executor& executor, core::Log& log)
     : folder_(std::move(folder)), executor_(&executor), log_(&log), reported_(folder_, log) {
   std::error_code ignored;

@@ -19,6 +19,9 @@
 
 namespace plumbline::net {
 
+/// The pose frame_from_robot of a shared frame.
+geometry::Rigid3 pose_of(const SharedFrame& frame);
+
 class HubMeetings {
  public:
   /// Applies what an earlier process left in the log, in the same order.

@@ -294,7 +294,11 @@ void HubServer::serve(const core::StopToken& stop, const Status& status) {
     bus_->wait(kWait);
     poll();
     if (meetings_.step()) {
-      for (auto& [name, session] : robots_) session.changed = true;
+      for (auto& [name, session] : robots_) {
+        session.changed = true;
+        const SharedFrame frame = meetings_.frame(name);
+        if (request_.placed && !frame.frame_of.empty()) request_.placed(name, pose_of(frame));
+      }
     }
     publish_all();
     feedback_.step(robots_, meetings_, *bus_);

@@ -15,10 +15,6 @@ using namespace std::chrono_literals;
 
 constexpr auto kShowEvery = 2s;
 
-geometry::Rigid3 pose_of_numbers(const std::array<double, 7>& p) {
-  return {Eigen::Quaterniond(p[6], p[3], p[4], p[5]), Eigen::Vector3d(p[0], p[1], p[2])};
-}
-
 }  // namespace
 
 void HubShow::step(const std::map<std::string, RobotSession>& robots, const HubMeetings& meetings) {
@@ -63,8 +59,7 @@ core::Result<void> HubShow::show_robot(const Task& task) {
   const geometry::Trajectory path = maps::keyframe_trajectory(stored->map);
   if (path.empty()) return {};
 
-  if (!task.frame.frame_of.empty())
-    observer_->placed(task.number, path.back().stamp, pose_of_numbers(task.frame.frame_from_robot));
+  if (!task.frame.frame_of.empty()) observer_->placed(task.number, path.back().stamp, pose_of(task.frame));
   observer_->tracked(task.number, path.back().stamp, path.back().world_from_camera,
                      path.back().world_from_camera);
   observer_->keyframes(task.number, path);
