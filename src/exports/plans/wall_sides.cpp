@@ -160,11 +160,11 @@ RunLook look_of(const WallRaster& raster, const std::pair<int, int>& run, double
   return look;
 }
 
-bool is_tall(const WallRaster& raster, const std::pair<int, int>& run, double cut_m) {
+bool is_tall(const WallRaster& raster, const std::pair<int, int>& run, double need_m, double cut_m) {
   constexpr double kTall_m = 1.6;  // cameras that are held look down, and see little above this
   constexpr double kLeastTall = 0.2;
   constexpr double kLeastAtCut = 0.1;
-  const RunLook look = look_of(raster, run, kTall_m, cut_m);
+  const RunLook look = look_of(raster, run, std::min(kTall_m, need_m), cut_m);
   return (run.second - run.first + 1) * WallRaster::kWidth_m >= kShortestWall_m && look.high >= kLeastTall &&
          look.at_cut > kLeastAtCut;
 }
@@ -222,7 +222,7 @@ std::vector<Side> sides_on(const evaluate::SurfaceSamples& samples, const evalua
 
   std::vector<Side> sides;
   for (const auto& run : filled_runs(raster)) {
-    if (!is_tall(raster, run, cut_m)) continue;
+    if (!is_tall(raster, run, need_m, cut_m)) continue;
     Side side;
     side.line = base;
 
