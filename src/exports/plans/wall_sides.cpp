@@ -50,6 +50,7 @@ double typical_spacing(const evaluate::SurfaceSamples& samples) {
     ++cells[{static_cast<int>(cell.x()), static_cast<int>(cell.y()), static_cast<int>(cell.z())}];
   }
   std::vector<int> counts;
+  counts.reserve(cells.size());
   for (const auto& [cell, count] : cells) counts.push_back(count);
   if (counts.empty()) return kCell_m;
   std::nth_element(counts.begin(), counts.begin() + static_cast<std::ptrdiff_t>(counts.size() / 2),
@@ -84,7 +85,7 @@ void fit_line(const std::vector<Eigen::Vector2d>& places, WallLine& line) {
   int most = -1;
   for (int b = 3; b + 3 < kBins; ++b) {
     int sum = 0;
-    for (int k = -3; k <= 3; ++k) sum += bins[static_cast<std::size_t>(b + k)];
+    for (int k = b - 3; k <= b + 3; ++k) sum += bins[static_cast<std::size_t>(k)];
     if (sum > most) {
       most = sum;
       best = b;
@@ -186,6 +187,7 @@ std::vector<Eigen::Vector3d> points_on(const evaluate::SurfaceSamples& samples, 
 /// Fits the line to all its points.
 void align_with_points(const std::vector<Eigen::Vector3d>& points, WallLine& line) {
   std::vector<Eigen::Vector2d> places;
+  places.reserve(points.size());
   for (const Eigen::Vector3d& p : points) places.emplace_back(p.head<2>());
   const Eigen::Vector2d along = line.along();
   const auto earlier = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {

@@ -28,6 +28,7 @@ std::vector<WallRaster> rasters_of(const std::vector<WallLine>& walls, const clo
                                    double floor_m) {
   constexpr double kSlab_m = 0.03;
   std::vector<WallRaster> rasters;
+  rasters.reserve(walls.size());
   for (const WallLine& wall : walls)
     rasters.emplace_back(wall.normal, wall.offset_m, wall.s0 - kWidestDoor_m, wall.s1 + kWidestDoor_m,
                          floor_m);
@@ -376,6 +377,7 @@ std::vector<WallDoor> doors_of(std::vector<WallLine>& walls) {
   constexpr double kThickest_m = 0.45;
   std::vector<WallDoor> doors;
   std::vector<std::vector<bool>> used;
+  used.reserve(walls.size());
   for (const WallLine& wall : walls) used.emplace_back(wall.openings.size(), false);
 
   for (std::size_t i = 0; i < walls.size(); ++i) {

@@ -310,7 +310,7 @@ core::Result<const cloud::CloudFile*> MapSource::whole_cloud() {
 core::Result<const cloud::CloudFile*> MapSource::cloud() {
   if (chosen_) return &*chosen_;
   const auto whole = whole_cloud();
-  if (!whole) return whole;
+  if (!whole) return tl::unexpected(whole.error());
   chosen_ = picked(**whole, [&](const Eigen::Vector3d& p) { return selected_.contains(p); });
   whole_.reset();
   if (chosen_->cloud->empty()) {

@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
+#include <exception>
 #include <limits>
 #include <map>
 #include <mutex>
@@ -86,6 +87,7 @@ struct LiveMap::Impl {
   explicit Impl(PageServer&& started) : server(std::move(started)) {}
 
   void follow();
+  void end();
   void look();
   void look_at(const fs::path& store, Json& robots);
   void show(const maps::StoreReader& reader, const maps::StoredMap& map, const std::string& store,
@@ -218,6 +220,19 @@ void LiveMap::Impl::follow() {
   }
 }
 
+void LiveMap::Impl::end() {
+  {
+    const std::lock_guard lock(mutex);
+    ended = true;
+  }
+  wake.notify_all();
+  thread.join();
+  at_once = std::numeric_limits<std::size_t>::max();
+  look();
+  server.send(R"({"done":true})", "done");
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));  // for clients to take it
+}
+
 LiveMap::LiveMap() = default;
 
 core::Result<std::unique_ptr<LiveMap>> LiveMap::start(const PageServerOptions& options,
@@ -238,16 +253,11 @@ core::Result<std::unique_ptr<LiveMap>> LiveMap::start(const PageServerOptions& o
 }
 
 LiveMap::~LiveMap() {
-  {
-    const std::lock_guard lock(impl_->mutex);
-    impl_->ended = true;
+  try {
+    impl_->end();
+  } catch (const std::exception&) {
+    return;  // the page does not hear that the run has ended
   }
-  impl_->wake.notify_all();
-  impl_->thread.join();
-  impl_->at_once = std::numeric_limits<std::size_t>::max();
-  impl_->look();
-  impl_->server.send(R"({"done":true})", "done");
-  std::this_thread::sleep_for(std::chrono::milliseconds(200));  // for clients to take it
 }
 
 std::string LiveMap::address() const { return impl_->server.address(); }
