@@ -15,6 +15,7 @@ import shutil
 import struct
 import subprocess
 import sys
+import urllib.request
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -487,6 +488,23 @@ def case_viewer_width(case):
     run(case.program, "export", office_truth(case, "1cm"), "-o", page)
     near, far = 14.0 - 5.45 - 0.01, 14.0 - 5.45 - 0.95 + 0.01
     viewer("width", page, far, 1.86, 1.0, near, 1.86, 1.0, near - far)
+
+
+def case_viewer_two(case):
+    """The room over what half of its frames give, from disk and as it is served."""
+    other = case.work / "half"
+    run(case.program, "map", recording_of(case.name), "--every", 2, "-o", other, "-q", "--force")
+    run(case.program, "report", case.map, other, "-o", case.work / "two.html", "--force", "-q")
+    viewer("two", case.work / "two.html")
+    with subprocess.Popen([case.program, "view", case.map, other, "--http", "127.0.0.1:0", "-q"], stdout=subprocess.PIPE,
+                          text=True) as server:
+        try:
+            served = case.work / "served.html"
+            with urllib.request.urlopen(server.stdout.readline().strip(), timeout=60) as answer:
+                served.write_bytes(answer.read())
+        finally:
+            server.terminate()
+    viewer("two", served)
 
 
 def case_viewer_firefox(case):
