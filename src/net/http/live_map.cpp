@@ -3,6 +3,7 @@
 
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
+#include <time.h>
 
 #include <algorithm>
 #include <array>
@@ -81,6 +82,18 @@ std::vector<fs::path> stores_in(const fs::path& folder) {
   return stores;
 }
 
+/// Whether a store is a robot's own map beside the map of all: OUT/robots/NAME/map.db.
+bool is_of_one_robot(const fs::path& store) {
+  return store.parent_path().parent_path().filename() == "robots";
+}
+
+/// Time that processors have spent on this thread.
+Clock::duration processor_time() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
+}
+
 }  // namespace
 
 struct LiveMap::Impl {
@@ -90,13 +103,13 @@ struct LiveMap::Impl {
   void end();
   void look();
   void look_at(const fs::path& store, Json& robots);
-  void show(const maps::StoreReader& reader, const maps::StoredMap& map, const std::string& store,
+  void show(const maps::StoreReader& reader, const maps::StoredMap& map,
             const geometry::Rigid3& shared_from_map, const std::map<std::int32_t, std::string>& names,
             std::size_t& budget);
 
   PageServer server;
   fs::path output;
-  std::map<std::pair<std::string, core::KeyframeId>, geometry::Rigid3> sent;
+  std::map<std::string, geometry::Rigid3> sent;    ///< where a keyframe lay, by robot and number
   std::map<std::string, int> colors;               ///< of robots, by name, as they came
   std::string words;                               ///< of tell()
   std::map<std::string, geometry::Rigid3> places;  ///< of place()
@@ -109,7 +122,7 @@ struct LiveMap::Impl {
 
 /// Sends keyframes' clouds that are new or have moved.
 void LiveMap::Impl::show(const maps::StoreReader& reader, const maps::StoredMap& map,
-                         const std::string& store, const geometry::Rigid3& shared_from_map,
+                         const geometry::Rigid3& shared_from_map,
                          const std::map<std::int32_t, std::string>& names, std::size_t& budget) {
   const auto with_cloud = reader.cloud_ids();
   if (!with_cloud) return;
@@ -117,22 +130,23 @@ void LiveMap::Impl::show(const maps::StoreReader& reader, const maps::StoredMap&
   const std::set<core::KeyframeId> there(with_cloud->begin(), with_cloud->end());
   for (const maps::KeyframePose& keyframe : maps::keyframe_poses(map.map)) {
     if (budget == 0) return;
-    const auto key = std::pair(store, keyframe.id);
-    const auto before = sent.find(key);
+    const auto robot = names.find(keyframe.id.robot);
+    if (robot == names.end() || there.count(keyframe.id) == 0) continue;
+
+    // The same in a robot's own map and in that of all, which so takes its place on the page.
+    const std::string name = robot->second + "/" + std::to_string(keyframe.id.index);
     const geometry::Rigid3 pose = shared_from_map * keyframe.world_from_camera;
-    const bool known = before != sent.end() && !far_from(before->second, pose);
-    if (known || there.count(keyframe.id) == 0 || names.count(keyframe.id.robot) == 0) continue;
+    const auto before = sent.find(name);
+    if (before != sent.end() && !far_from(before->second, pose)) continue;
 
     const auto cloud = reader.cloud(keyframe.id);
     if (!cloud) continue;
-    const std::string name =
-        store + "/" + std::to_string(keyframe.id.robot) + "/" + std::to_string(keyframe.id.index);
     const std::string json = viewer::cloud_json(placed(**cloud, pose), false);
 
-    server.send("{\"key\":" + Json(name).dump() + ",\"robot\":" +
-                    std::to_string(colors[names.at(keyframe.id.robot)]) + ",\"cloud\":" + json + "}",
+    server.send("{\"key\":" + Json(name).dump() + ",\"robot\":" + std::to_string(colors[robot->second]) +
+                    ",\"cloud\":" + json + "}",
                 name);
-    sent[key] = pose;
+    sent[name] = pose;
     --budget;
   }
 }
@@ -147,7 +161,7 @@ void LiveMap::Impl::look_at(const fs::path& store, Json& robots) {
 
   // A hub's copy is known by its folder, and lies where the hub's meetings have put it.
   const std::string folder = store.parent_path().filename().string();
-  const bool copy = store.parent_path().parent_path().filename() == "robots";
+  const bool copy = is_of_one_robot(store);
   geometry::Rigid3 shared_from_map;
   if (copy) {
     const std::lock_guard lock(mutex);
@@ -178,7 +192,7 @@ void LiveMap::Impl::look_at(const fs::path& store, Json& robots) {
                         {"keyframes", map.map.keyframe_count()},
                         {"stamp", path->second.back().stamp}});
     }
-    show(*reader, map, folder, shared_from_map, names, budget);
+    show(*reader, map, shared_from_map, names, budget);
   }
 }
 
@@ -189,7 +203,14 @@ void LiveMap::Impl::look() {
   if (!fs::exists(folder, ec)) folder = output;
   Json robots = Json::array();
 
-  for (const fs::path& store : stores_in(folder)) look_at(store, robots);
+  // Where there is a map of all, finished or not, it stands for the robots' own ones.
+  const std::vector<fs::path> stores = stores_in(folder);
+  for (const bool own : {false, true}) {
+    if (!robots.empty()) break;
+    for (const fs::path& store : stores) {
+      if (is_of_one_robot(store) == own) look_at(store, robots);
+    }
+  }
   if (robots.empty()) return;
 
   std::string line;
@@ -212,10 +233,11 @@ void LiveMap::Impl::follow() {
   std::unique_lock lock(mutex);
   while (!ended) {
     lock.unlock();
-    const Clock::time_point begin = Clock::now();
+    const Clock::duration before = processor_time();
     look();
-    const Clock::duration took = Clock::now() - begin;
+    const Clock::duration took = processor_time() - before;
     lock.lock();
+    // A tenth of a processor at most; time that it waited for one is none of the run's.
     wake.wait_for(lock, std::max<Clock::duration>(std::chrono::seconds(1), 10 * took), [&] { return ended; });
   }
 }
