@@ -82,7 +82,7 @@ std::vector<fs::path> stores_in(const fs::path& folder) {
   return stores;
 }
 
-/// Whether a store is a robot's own map beside the map of all: OUT/robots/NAME/map.db.
+/// True if a store is a robot's own map beside the map of all: OUT/robots/NAME/map.db.
 bool is_of_one_robot(const fs::path& store) {
   return store.parent_path().parent_path().filename() == "robots";
 }
