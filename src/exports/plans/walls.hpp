@@ -68,8 +68,6 @@ void fit_sides(const cloud::CloudFile& file, double floor_m, const core::Executo
                std::vector<WallLine>& walls);
 /// Lets ends meet where lines cross.
 void join_corners(std::vector<WallLine>& walls);
-/// Openings of a wall's two sides that are one door become equally wide where a leaf hid a part of one.
-std::vector<WallDoor> doors_of(std::vector<WallLine>& walls);
 std::vector<WallRoom> rooms_of(const std::vector<WallLine>& walls);
 
 }  // namespace plumbline::exports

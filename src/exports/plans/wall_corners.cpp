@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Ends of walls meet where their lines cross.
+#include <algorithm>
+#include <cmath>
+
+#include "plans/wall_steps.hpp"
+
+namespace plumbline::exports {
+namespace {
+
+/// True if the two are seen from one side: each stands in front of the other, or each behind it.
+bool make_a_corner(const WallLine& a, const WallLine& b) {
+  const bool b_before = a.normal.dot(b.at(0.5 * (b.s0 + b.s1))) > a.offset_m;
+  const bool a_before = b.normal.dot(a.at(0.5 * (a.s0 + a.s1))) > b.offset_m;
+  return a_before == b_before;
+}
+
+}  // namespace
+
+void join_corners(std::vector<WallLine>& walls) {
+  constexpr double kReach_m = 0.3;
+  constexpr double kBeyond_m = 0.08;  // that a wall was seen beyond its corner, by noise
+  constexpr double kLeastTurn = 0.5;  // sine of 30 degrees
+  for (WallLine& wall : walls) {
+    wall.corner = {-1, -1};
+    wall.corner_end = {0, 0};
+  }
+
+  struct Meeting {
+    double distance;
+    std::size_t wall;
+    int end;
+    std::size_t other;
+    int other_end;
+    double s;
+    double other_s;
+  };
+
+  std::vector<Meeting> meetings;
+  for (std::size_t i = 0; i < walls.size(); ++i) {
+    for (std::size_t j = 0; j < walls.size(); ++j) {
+      Eigen::Matrix2d normals;
+      normals.row(0) = walls[i].normal.transpose();
+      normals.row(1) = walls[j].normal.transpose();
+      if (i == j || std::abs(normals.determinant()) < kLeastTurn) continue;
+
+      const Eigen::Vector2d at = normals.inverse() * Eigen::Vector2d(walls[i].offset_m, walls[j].offset_m);
+      const double s = walls[i].along().dot(at);
+      const double t = walls[j].along().dot(at);
+
+      for (int end = 0; end < 2; ++end) {
+        const double more = end == 0 ? walls[i].s0 - s : s - walls[i].s1;  // that the wall is longer
+        const double off = std::abs(more);
+        if (more > kReach_m || more < -kBeyond_m) continue;
+        for (int other = 0; other < 2; ++other) {
+          const double other_more = other == 0 ? walls[j].s0 - t : t - walls[j].s1;
+          if (other_more <= kReach_m && other_more >= -kBeyond_m && make_a_corner(walls[i], walls[j]))
+            meetings.push_back({off + std::abs(other_more), i, end, j, other, s, t});
+        }
+        if (t > walls[j].s0 + kReach_m && t < walls[j].s1 - kReach_m)
+          meetings.push_back({off + 2.0 * kReach_m, i, end, j, 2, s, t});
+      }
+    }
+  }
+
+  std::stable_sort(meetings.begin(), meetings.end(),
+                   [](const Meeting& a, const Meeting& b) { return a.distance < b.distance; });
+  for (const Meeting& m : meetings) {
+    WallLine& wall = walls[m.wall];
+    WallLine& other = walls[m.other];
+    if (wall.corner[static_cast<std::size_t>(m.end)] >= 0) continue;
+    if (m.other_end < 2 && other.corner[static_cast<std::size_t>(m.other_end)] >= 0) continue;
+
+    wall.corner[static_cast<std::size_t>(m.end)] = static_cast<int>(m.other);
+    wall.corner_end[static_cast<std::size_t>(m.end)] = m.other_end;
+    (m.end == 0 ? wall.s0 : wall.s1) = m.s;
+    if (m.other_end == 2) continue;
+
+    other.corner[static_cast<std::size_t>(m.other_end)] = static_cast<int>(m.wall);
+    other.corner_end[static_cast<std::size_t>(m.other_end)] = m.end;
+    (m.other_end == 0 ? other.s0 : other.s1) = m.other_s;
+  }
+}
+
+void meet_hidden_walls(std::vector<WallLine>& walls) {
+  constexpr double kNear_m = 0.06;
+  constexpr double kHidden_m = 2.5;
+  constexpr double kShortest_m = 1.0;
+  constexpr double kLeastTurn = 0.5;  // sine of 30 degrees
+  const std::vector<WallLine> all = walls;
+  for (WallLine& wall : walls) {
+    for (int end = 0; end < 2; ++end) {
+      if (wall.corner[static_cast<std::size_t>(end)] >= 0) continue;
+      double& own = end == 0 ? wall.s0 : wall.s1;
+      double best = kNear_m, moved = own;
+
+      for (const WallLine& other : all) {
+        const double turn = other.normal.dot(wall.along());
+        if (std::abs(turn) < kLeastTurn || other.length() < kShortest_m) continue;
+        const double s = own + (other.offset_m - other.normal.dot(wall.at(own))) / turn;
+        const double t = other.along().dot(wall.at(s));
+        const double hidden = std::max(other.s0 - t, t - other.s1);
+        if (std::abs(s - own) >= best || hidden > kHidden_m || hidden < 0.0) continue;
+        best = std::abs(s - own);
+        moved = s;
+      }
+
+      own = moved;
+    }
+  }
+}
+
+}  // namespace plumbline::exports

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Openings of walls, and the doors that they are.
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "plans/wall_steps.hpp"
+
+namespace plumbline::exports {
+namespace {
+
+/// Mean over the columns from a to b.
+template <typename Share>
+double mean_share(int a, int b, const Share& share) {
+  double sum = 0.0;
+  for (int c = a; c <= b; ++c) sum += share(c);
+  return sum / std::max(1, b - a + 1);
+}
+
+bool open_column(const WallRaster& raster, int column, const Cut& cut) {
+  constexpr double kMost = 0.25;
+  return raster.seen(column, 0.25, 0.8) <= kMost && raster.seen(column, cut.low_m, cut.high_m) <= kMost;
+}
+
+/// True if cameras looked through; if the rays are not known, true if there is a lintel above.
+bool is_passage(const WallRaster& raster, int a, int b, const Cut& cut) {
+  constexpr double kLeastCrossed = 0.08;
+  constexpr double kLeastLintel = 0.3;
+  if (cut.rays_known)
+    return mean_share(a, b, [&](int c) { return raster.crossed(c, 0.3, 1.9); }) >= kLeastCrossed;
+  return mean_share(a, b, [&](int c) { return raster.seen(c, 2.15, 2.5); }) >= kLeastLintel;
+}
+
+/// An opening up to where its wall begins: leaves and frames reach a little into it.
+WallOpening widened(const WallRaster& raster, const WallLine& wall, WallOpening opening, const Cut& cut) {
+  const int first = raster.column_at(wall.at(opening.s0));
+  const int last = raster.column_at(wall.at(opening.s1));
+  int a = first;
+  int b = last;
+  while (a > 0 && open_column(raster, a - 1, cut) && raster.start_of(b) - raster.start_of(a) < kWidestDoor_m)
+    --a;
+  while (b + 1 < raster.columns() && open_column(raster, b, cut) &&
+         raster.start_of(b) - raster.start_of(a) < kWidestDoor_m)
+    ++b;
+  opening.s0 -= (first - a) * WallRaster::kWidth_m;
+  opening.s1 += (b - last) * WallRaster::kWidth_m;
+  return opening;
+}
+
+/// The line through two pieces of one, each of which counts by its length.
+WallLine joined_pieces(const WallLine& a, const WallLine& b) {
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  for (const WallLine* piece : {&a, &b})
+    middle += piece->length() * piece->at(0.5 * (piece->s0 + piece->s1)) / (a.length() + b.length());
+
+  Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
+  for (const WallLine* piece : {&a, &b}) {
+    const Eigen::Vector2d off = piece->at(0.5 * (piece->s0 + piece->s1)) - middle;
+    const double own = piece->length() * piece->length() / 12.0;
+    spread += piece->length() * (off * off.transpose() + own * piece->along() * piece->along().transpose());
+  }
+
+  const Eigen::Vector2d across = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(spread).eigenvectors().col(0);
+  WallLine line = a;
+  line.normal = across.dot(a.normal) < 0.0 ? Eigen::Vector2d(-across) : across;
+  line.offset_m = line.normal.dot(middle);
+  line.s0 = line.along().dot(a.at(a.s0));
+  line.s1 = line.along().dot(b.at(b.s1));
+  line.openings.clear();
+  for (const WallLine* piece : {&a, &b}) {
+    for (const WallOpening& o : piece->openings)
+      line.openings.push_back({line.along().dot(piece->at(o.s0)), line.along().dot(piece->at(o.s1))});
+  }
+
+  line.corner[1] = b.corner[1];
+  line.top_m = std::max(a.top_m, b.top_m);
+  line.high = std::max(a.high, b.high);
+  return line;
+}
+
+/// Makes both ends of the same opening, on the two sides of a wall, lie opposite each other.
+void level_openings(const WallLine& a, WallOpening& of_a, const WallLine& b, WallOpening& of_b) {
+  constexpr double kAlike_m = 0.05;
+  const double first = a.along().dot(b.at(of_b.s1));
+  const double last = a.along().dot(b.at(of_b.s0));
+  if (std::abs(first - of_a.s0) > kAlike_m) {
+    of_a.s0 = std::min(first, of_a.s0);
+    of_b.s1 = b.along().dot(a.at(of_a.s0));
+  }
+  if (std::abs(last - of_a.s1) > kAlike_m) {
+    of_a.s1 = std::max(last, of_a.s1);
+    of_b.s0 = b.along().dot(a.at(of_a.s1));
+  }
+}
+
+}  // namespace
+
+std::vector<WallOpening> openings_between(const WallRaster& raster, double s0, double s1, const Cut& cut) {
+  constexpr int kBridge = 3;  // columns with a door's handle or the like
+  std::vector<std::pair<int, int>> runs;
+  for (int c = raster.column_of(s0); c <= raster.column_of(s1); ++c) {
+    if (!open_column(raster, c, cut)) continue;
+    if (!runs.empty() && c - runs.back().second <= kBridge) {
+      runs.back().second = c;
+    } else {
+      runs.emplace_back(c, c);
+    }
+  }
+
+  std::vector<WallOpening> openings;
+  for (const auto& [a, b] : runs) {
+    const WallOpening opening{raster.start_of(a), raster.start_of(b + 1)};
+    const double width = opening.s1 - opening.s0;
+    if (width >= kNarrowestDoor_m && width <= kWidestDoor_m && is_passage(raster, a, b, cut))
+      openings.push_back(opening);
+  }
+
+  return openings;
+}
+
+void bridge_gaps(std::vector<WallLine>& walls, std::vector<Fronts>& fronts, const Cut& cut) {
+  constexpr double kLongest_m = 1.6;
+  constexpr double kSameLine_m = 0.025;
+  for (std::size_t i = 0; i < walls.size(); ++i) {
+    for (std::size_t j = 0; j < walls.size(); ++j) {
+      WallLine& a = walls[i];
+      const WallLine& b = walls[j];
+      if (i == j || a.corner[1] >= 0 || b.corner[0] >= 0 || a.normal.dot(b.normal) < 0.998) continue;
+
+      const double from = a.along().dot(b.at(b.s0));
+      const double gap = from - a.s1;
+      if (gap <= 0.0 || gap > kLongest_m || std::abs(a.normal.dot(b.at(b.s0)) - a.offset_m) > kSameLine_m)
+        continue;
+
+      const WallRaster& front = *fronts[i].last;
+      const bool crossed = is_passage(front, front.column_at(a.at(a.s1)), front.column_at(b.at(b.s0)),
+                                      {cut.low_m, cut.high_m, true});
+      if (crossed && gap < kNarrowestDoor_m) continue;
+
+      if (crossed || !cut.rays_known) a.openings.push_back(widened(front, a, {a.s1, from}, cut));
+      a = joined_pieces(a, b);
+      fronts[i].last = fronts[j].last;
+
+      walls.erase(walls.begin() + static_cast<std::ptrdiff_t>(j));
+      fronts.erase(fronts.begin() + static_cast<std::ptrdiff_t>(j));
+      join_corners(walls);
+      i = static_cast<std::size_t>(-1);  // from the start: numbers have changed
+      break;
+    }
+  }
+}
+
+std::vector<WallDoor> doors_of(std::vector<WallLine>& walls) {
+  std::vector<WallDoor> doors;
+  std::vector<std::vector<bool>> used;
+  used.reserve(walls.size());
+  for (const WallLine& wall : walls) used.emplace_back(wall.openings.size(), false);
+
+  for (std::size_t i = 0; i < walls.size(); ++i) {
+    for (std::size_t k = 0; k < walls[i].openings.size(); ++k) {
+      if (used[i][k]) continue;
+      const WallLine& wall = walls[i];
+      WallOpening& opening = walls[i].openings[k];
+      WallDoor door;
+      door.jambs = {wall.at(opening.s0), wall.at(opening.s1)};
+      door.far_jambs = door.jambs;
+      door.width_m = opening.s1 - opening.s0;
+
+      // The other side of the same wall.
+      for (std::size_t j = 0; j < walls.size(); ++j) {
+        if (walls[j].normal.dot(wall.normal) > -0.98) continue;
+
+        for (std::size_t m = 0; m < walls[j].openings.size(); ++m) {
+          const std::array<Eigen::Vector2d, 2> far = {walls[j].at(walls[j].openings[m].s1),
+                                                      walls[j].at(walls[j].openings[m].s0)};
+          const double behind = wall.offset_m - wall.normal.dot(far[0]);
+          const double common =
+              std::min(opening.s1, wall.along().dot(far[1])) - std::max(opening.s0, wall.along().dot(far[0]));
+          if (used[j][m] || behind < 0.0 || behind > kThickestWall_m || common < 0.5 * door.width_m) continue;
+          used[j][m] = true;
+          level_openings(wall, opening, walls[j], walls[j].openings[m]);
+          door.jambs = {wall.at(opening.s0), wall.at(opening.s1)};
+          door.far_jambs = {walls[j].at(walls[j].openings[m].s1), walls[j].at(walls[j].openings[m].s0)};
+          door.width_m = std::min(opening.s1 - opening.s0, walls[j].openings[m].s1 - walls[j].openings[m].s0);
+        }
+      }
+
+      doors.push_back(door);
+    }
+  }
+
+  return doors;
+}
+
+std::vector<WallDoor> doors_between_sides(const std::vector<WallLine>& walls,
+                                          const std::vector<Fronts>& fronts, const Cut& cut) {
+  std::vector<WallDoor> doors;
+  for (std::size_t i = 0; i < walls.size(); ++i) {
+    for (std::size_t j = i + 1; j < walls.size(); ++j) {
+      const WallLine& a = walls[i];
+      const WallLine& b = walls[j];
+      const double behind = a.offset_m - a.normal.dot(b.at(0.5 * (b.s0 + b.s1)));
+      if (a.normal.dot(b.normal) > -0.998 || behind < 0.0 || behind > kThickestWall_m) continue;
+
+      // The other side runs backwards, so that its ends in the gap have equal numbers.
+      for (std::size_t end = 0; end < 2; ++end) {
+        if (a.corner[end] >= 0 || b.corner[end] >= 0) continue;
+        const Eigen::Vector2d jamb = a.at(end == 0 ? a.s0 : a.s1);
+        const Eigen::Vector2d far = b.at(end == 0 ? b.s0 : b.s1);
+        const double gap = (end == 0 ? -1.0 : 1.0) * a.along().dot(far - jamb);
+        if (gap < kNarrowestDoor_m || gap > kWidestDoor_m) continue;
+
+        const WallRaster& front = end == 0 ? *fronts[i].first : *fronts[i].last;
+        const int c0 = front.column_at(jamb), c1 = front.column_at(far);
+        if (!is_passage(front, std::min(c0, c1), std::max(c0, c1), cut)) continue;
+        const Eigen::Vector2d across = (a.normal.dot(far) - a.offset_m) * a.normal;
+        doors.push_back({{jamb, far - across}, {jamb + across, far}, gap});
+      }
+    }
+  }
+
+  return doors;
+}
+
+}  // namespace plumbline::exports

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Tells walls from tall furniture and door leaves.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "plans/wall_steps.hpp"
+
+namespace plumbline::exports {
+namespace {
+
+/// True if two sides lie on one line, one behind the other.
+bool in_line(const WallLine& a, const WallLine& b) {
+  constexpr double kSameLine_m = 0.03;
+  return a.normal.dot(b.normal) > 0.998 &&
+         std::abs(a.normal.dot(b.at(0.5 * (b.s0 + b.s1))) - a.offset_m) < kSameLine_m;
+}
+
+/// True if cameras looked over it, where its upper edge was seen at all.
+bool is_looked_over(const WallLine& side, const WallRaster& raster) {
+  constexpr double kLeastTop_m = 1.5;
+  constexpr double kGap_m = 0.1;
+  constexpr double kAbove_m = 0.5;
+  constexpr double kCrossed = 0.3;
+  constexpr double kShare = 0.3;
+  int columns = 0, over = 0;
+  for (int c = raster.column_of(side.s0); c <= raster.column_of(side.s1); ++c) {
+    const double top = raster.top(c);
+    if (top < kLeastTop_m) continue;
+    ++columns;
+    if (raster.crossed(c, top + kGap_m, top + kAbove_m) >= kCrossed) ++over;
+  }
+  return over > kShare * columns;
+}
+
+/// True if a wall that faces the same way runs a little behind the side: a longer one, or two parts of one,
+/// to the left and to the right, of which the side hides the middle.
+bool stands_before_wall(const WallLine& side, const std::vector<WallLine>& walls) {
+  constexpr double kNearest_m = 0.12;
+  constexpr double kFarthest_m = 0.75;
+  constexpr double kReach_m = 0.4;
+  bool before = false, behind = false;
+  for (const WallLine& wall : walls) {
+    if (wall.normal.dot(side.normal) < 0.998) continue;
+    const double s0 = wall.along().dot(side.at(side.s0));
+    const double s1 = wall.along().dot(side.at(side.s1));
+    const double distance = wall.normal.dot(side.at(0.5 * (side.s0 + side.s1))) - wall.offset_m;
+    if (distance < kNearest_m || distance > kFarthest_m) continue;
+    if (wall.s0 - kReach_m < s0 && wall.s1 + kReach_m > s1 && wall.length() > side.length()) return true;
+    before = before || (wall.s0 < s0 && wall.s1 > s0 - kReach_m);
+    behind = behind || (wall.s1 > s1 && wall.s0 < s1 + kReach_m);
+  }
+  return before && behind;
+}
+
+/// Keeps the sides for which keep(number) is true.
+template <typename Keep>
+void keep_sides(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, const Keep& keep) {
+  std::vector<WallLine> kept;
+  std::vector<WallRaster> kept_rasters;
+  for (std::size_t i = 0; i < walls.size(); ++i) {
+    if (!keep(i)) continue;
+    kept.push_back(walls[i]);
+    kept_rasters.push_back(std::move(rasters[i]));
+  }
+  walls = std::move(kept);
+  rasters = std::move(kept_rasters);
+}
+
+}  // namespace
+
+void drop_furniture(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, bool rays_known) {
+  constexpr double kLongest_m = 3.0;  // of furniture
+  constexpr double kLeastHigh = 0.2;  // share of a side that reaches so high as to be no furniture
+  keep_sides(walls, rasters, [&](std::size_t i) {
+    const bool high = walls[i].high >= kLeastHigh;
+    if (!high && (!rays_known || is_looked_over(walls[i], rasters[i]))) return false;
+    return walls[i].length() >= kLongest_m || !stands_before_wall(walls[i], walls);
+  });
+}
+
+void drop_loose_sides(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters) {
+  constexpr double kShort_m = 1.5;
+  constexpr double kStub_m = 0.6;
+  constexpr double kSquare = 0.05;  // cosine: within 3 degrees
+  std::vector<WallLine> joined = walls;
+  join_corners(joined);
+
+  keep_sides(walls, rasters, [&](std::size_t i) {
+    if (walls[i].length() >= kShort_m) return true;
+
+    const bool met = joined[i].corner[0] >= 0 && joined[i].corner[1] >= 0;
+    if (met && walls[i].length() >= kStub_m) return true;
+
+    const bool square = std::any_of(joined[i].corner.begin(), joined[i].corner.end(), [&](int other) {
+      return other >= 0 &&
+             std::abs(joined[i].normal.dot(joined[static_cast<std::size_t>(other)].normal)) < kSquare &&
+             joined[static_cast<std::size_t>(other)].length() >= kShort_m;
+    });
+    if (square) return true;
+
+    return std::any_of(walls.begin(), walls.end(), [&](const WallLine& other) {
+      return &other != &walls[i] && other.length() >= 0.5 * kShort_m && in_line(walls[i], other);
+    });
+  });
+}
+
+}  // namespace plumbline::exports

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Steps from the sides of walls that a cloud shows to a plan with corners and doors.
+#include <memory>
+#include <vector>
+
+#include "plans/wall_raster.hpp"
+#include "plans/walls.hpp"
+
+namespace plumbline::exports {
+
+/// Drops tall sides that are no wall: cameras looked over them, or they stand in front of a wall. Without
+/// rays only what reaches high is known to be a wall.
+void drop_furniture(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, bool rays_known);
+/// Drops door leaves and parts of furniture: short sides that neither meet walls at both ends, or one at a
+/// right angle, nor continue along a line.
+void drop_loose_sides(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters);
+
+/// Moves ends that meet no wall to the line of a wall that passes within a few centimetres of them, where
+/// that wall was hidden.
+void meet_hidden_walls(std::vector<WallLine>& walls);
+
+/// Rasters of a side's first and last part; the same one for a side that was not joined from parts.
+struct Fronts {
+  std::shared_ptr<const WallRaster> first, last;
+};
+
+constexpr double kNarrowestDoor_m = 0.55;
+constexpr double kWidestDoor_m = 1.6;
+constexpr double kThickestWall_m = 0.45;
+
+/// Heights between which a column must be free to count as open, metres.
+struct Cut {
+  double low_m;
+  double high_m;
+  bool rays_known;
+};
+
+/// Openings between two places of a side.
+std::vector<WallOpening> openings_between(const WallRaster& raster, double s0, double s1, const Cut& cut);
+/// Joins sides that lie on one line where the wall between them was only hidden, or is a door.
+void bridge_gaps(std::vector<WallLine>& walls, std::vector<Fronts>& fronts, const Cut& cut);
+/// Doors of openings. Openings that are one door, on the two sides of a wall, become equally wide where a
+/// door leaf hid a part of one.
+std::vector<WallDoor> doors_of(std::vector<WallLine>& walls);
+/// Doors whose jambs were seen from different sides of the wall, one from each.
+std::vector<WallDoor> doors_between_sides(const std::vector<WallLine>& walls,
+                                          const std::vector<Fronts>& fronts, const Cut& cut);
+
+}  // namespace plumbline::exports
