@@ -24,9 +24,11 @@ bool sticks(char a, char b) {
 std::size_t end_of_literal(const std::string& text, std::size_t from) {
   const char quote = text[from];
   std::size_t i = from + 1;
+
   while (i < text.size() && text[i] != quote) {
     if (text[i] == '\\') {
       i += 2;
+
     } else if (quote == '`' && text.compare(i, 2, "${") == 0) {
       int depth = 1;
       for (i += 2; i < text.size() && depth > 0; ++i) {
@@ -36,10 +38,12 @@ std::size_t end_of_literal(const std::string& text, std::size_t from) {
           depth += text[i] == '{' ? 1 : text[i] == '}' ? -1 : 0;
         }
       }
+
     } else {
       ++i;
     }
   }
+
   return i + 1;
 }
 
@@ -66,6 +70,8 @@ std::string shortened(const std::string& text, const std::string& kind) {
   for (std::size_t i = 0; i < text.size();) {
     const char c = text[i];
     const char last = out.empty() ? '\n' : out.back();
+
+    // Comments go, blanks and line breaks as far as they mean nothing.
     if (text.compare(i, 2, "/*") == 0) {
       i = text.find("*/", i) + 2;
       blank = true;
@@ -81,7 +87,9 @@ std::string shortened(const std::string& text, const std::string& kind) {
       }
       blank = true;
       ++i;
+
     } else {
+      // Literals and patterns are copied whole.
       const bool literal = script && (c == '\'' || c == '"' || c == '`');
       const bool pattern = script && c == '/' && before_pattern(last);
       const bool word =
@@ -90,13 +98,16 @@ std::string shortened(const std::string& text, const std::string& kind) {
                              : literal ? end_of_literal(text, i)
                              : pattern ? end_of_pattern(text, i)
                                        : i + 1;
-      // In styles a blank before these tells something.
+
+      // In styles a blank between other letters has a meaning.
       const bool needed = kind == "css" && std::string(">+~{}:;,()").find(c) == std::string::npos &&
                           std::string("{};:,>").find(last) == std::string::npos;
+
+      // A semicolon or a line break in front of a closing bracket ends nothing that the bracket does not end.
       if (script && c == '}' && last == ';') out.pop_back();
-      // Before these a line's end ends no statement that they would continue otherwise.
       if (script && last == '\n' && out.size() > 1 && std::string("}).]").find(c) != std::string::npos)
         out.pop_back();
+
       if (blank && last != '\n' && (sticks(last, c) || needed || (kind == "css" && (c == ':' || c == '('))))
         out += ' ';
       out += word ? "let" : text.substr(i, to - i);
@@ -128,6 +139,7 @@ int main(int count, char** names) {
       std::cerr << "embed: cannot read " << names[i] << '\n';
       return 1;
     }
+
     const std::string kind = ending(names[i]);
     const std::string shorter = shortened(text, kind);
     if (kind == "js") (base(names[i]) == "live.js" ? live : scripts) += shorter;

@@ -153,6 +153,7 @@ void add_topic_option(CLI::App& command, dataset::OpenOptions& open) {
                           : what == "info"       ? &open.topics.info
                           : what == "depth_info" ? &open.topics.depth_info
                                                  : nullptr;
+
       if (name == nullptr || equals == std::string::npos || equals + 1 == pair.size()) {
         throw CLI::ValidationError(
             "--topic", fmt::format("'{}' (allowed: color=, depth=, info= or depth_info= and a topic)", pair));
@@ -160,6 +161,7 @@ void add_topic_option(CLI::App& command, dataset::OpenOptions& open) {
       *name = pair.substr(equals + 1);
     }
   };
+
   command
       .add_option_function<std::vector<std::string>>(
           "--topic", take,

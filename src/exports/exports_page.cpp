@@ -17,7 +17,8 @@ constexpr const char* kExportsIntroduction = R"(# Exports
 
 `plumbline export MAP -o FILE` writes a map in the format of another program. `MAP` is a result folder, the
 `map.db` of a run (of an interrupted one, too), a fused map of several robots, or, where a cloud is enough, any
-PLY or PCD file. A folder below `components/`, a map that did not join the rest of its run, gives what needs no `map.db`.
+PLY or PCD file. A folder below `components/` holds a map that did not join the rest of its run; it can be exported to the formats
+that need no `map.db`.
 The format follows from the ending of the output, or from `--format`.
 
 ```sh
@@ -53,7 +54,7 @@ For a map of 1.5 million points (a generated office, 181 keyframes, 826 views) o
 | mesh as `.obj`, `.glb` | 54, 63 | 124 MB, 42 MB |
 | COLMAP, nerfstudio (181 pictures) | 7, 9 | 71 MB, 86 MB |
 
-The largest memory of each, but for meshes, was 0.25 GB for a kitchen of 1.16 million points (27 keyframes, 174 views).
+Except for meshes, none took more than 0.25 GB of memory for a kitchen of 1.16 million points (27 keyframes, 174 views).
 
 ## At the end of a run
 

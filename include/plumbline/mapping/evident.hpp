@@ -16,7 +16,9 @@ namespace plumbline::mapping {
 /// do.
 inline double evident_s(const MergeEvidence& merge, const std::map<core::KeyframeId, double>& made) {
   constexpr std::size_t kEnough = 5;
-  std::map<core::KeyframeId, double> paired;  // of each keyframe, first
+
+  // The time at which each keyframe was first in a pair.
+  std::map<core::KeyframeId, double> paired;
   for (const VerifiedPair& pair : merge.pairs) {
     const auto query = made.find(pair.query);
     const auto match = made.find(pair.match);
@@ -27,6 +29,8 @@ inline double evident_s(const MergeEvidence& merge, const std::map<core::Keyfram
       known->second = std::min(known->second, both);
     }
   }
+
+  // The time at which each robot had enough of them: the later one counts.
   std::map<std::int32_t, std::vector<double>> sides;
   for (const auto& [id, time] : paired) sides[id.robot].push_back(time);
   double latest = -1.0;

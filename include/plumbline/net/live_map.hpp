@@ -13,7 +13,7 @@
 namespace plumbline::net {
 
 /// Serves a page and feeds it from every map.db in a folder, beside the run that writes them. Between two
-/// looks it sleeps ten times as long as a look took, a second at least.
+/// looks it sleeps ten times the processor time that a look took, a second at least.
 class LiveMap {
  public:
   /// `output`: OUT of the run; OUT.partial is followed while it is there. Errors as PageServer::start.

@@ -21,8 +21,10 @@ const char* const kTwoTerminals =
 int hub(Session& session, net::HubRequest request, double quota_gb, const std::string& publish,
         const PageAddress& page) {
   if (auto equipped = session.equip(request.fuse); !equipped) return session.fail(equipped.error());
+
   request.quota_bytes = static_cast<std::uint64_t>(quota_gb * 1e9);
   request.fresh_id = fresh_id();
+
   if (request.resume && pipeline::is_finished(request.fuse.output)) {
     session.console().info(request.fuse.output.string() + ": is finished; there is nothing to continue");
     return 0;
@@ -30,6 +32,7 @@ int hub(Session& session, net::HubRequest request, double quota_gb, const std::s
   if (auto prepared = prepare_publisher(session, publish, net::PublishedNames::kOfEach, "", request.fuse);
       !prepared)
     return session.fail(prepared.error());
+
   Console& console = session.console();
   const auto live = live_map(page, request.fuse.output, console);
   if (!live) return session.fail(live.error());

@@ -25,7 +25,8 @@ struct GlbData {
   std::vector<std::array<float, 3>> normals;  ///< empty for points
   std::vector<std::array<std::uint16_t, 4>> colors;
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< empty: points
-  std::array<double, 3> shift{};  ///< of all positions: large coordinates, too long for floats
+  std::array<double, 3>
+      shift{};  ///< added to all positions, metres: large coordinates do not fit into floats
 };
 
 /// Linear light of each sRGB value (IEC 61966-2-1), in 65535ths.

@@ -133,7 +133,8 @@ void LiveMap::Impl::show(const maps::StoreReader& reader, const maps::StoredMap&
     const auto robot = names.find(keyframe.id.robot);
     if (robot == names.end() || there.count(keyframe.id) == 0) continue;
 
-    // The same in a robot's own map and in that of all, which so takes its place on the page.
+    // The name is the same in a robot's own map and in the map of all, whose clouds so replace the earlier
+    // ones.
     const std::string name = robot->second + "/" + std::to_string(keyframe.id.index);
     const geometry::Rigid3 pose = shared_from_map * keyframe.world_from_camera;
     const auto before = sent.find(name);
@@ -237,7 +238,7 @@ void LiveMap::Impl::follow() {
     look();
     const Clock::duration took = processor_time() - before;
     lock.lock();
-    // A tenth of a processor at most; time that it waited for one is none of the run's.
+    // It takes a tenth of a processor at most. Time for which it waited for one does not count.
     wake.wait_for(lock, std::max<Clock::duration>(std::chrono::seconds(1), 10 * took), [&] { return ended; });
   }
 }
