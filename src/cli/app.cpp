@@ -49,8 +49,11 @@ const core::Executor& Session::executor() {
 }
 
 int Session::fail(const core::Error& error) {
-  const auto problems = std::count(error.message.begin(), error.message.end(), '\n') + 1;
-  // Several problems are printed on separate lines, so that an editor can follow file:line:column.
+  // Several problems are printed on separate lines, so that an editor can follow file:line:column. Lines that
+  // are indented belong to the one above.
+  std::size_t problems = 1;
+  for (std::size_t i = 1; i < error.message.size(); ++i)
+    problems += error.message[i - 1] == '\n' && error.message[i] != ' ' ? 1 : 0;
   console().error(problems > 1 ? fmt::format("{} problems\n{}", problems, error.message) : error.message);
   return static_cast<int>(error.kind);
 }

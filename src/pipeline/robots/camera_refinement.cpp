@@ -13,12 +13,17 @@ namespace {
 
 constexpr double kGuessedFocalSigma = 0.01;  // a guess is confirmed when its focal length is known so well
 
+const char* unit_of(const std::string& name) {
+  if (name == "readout" || name == "depth_delay") return " s";
+  return name == "fx" || name == "fy" || name == "cx" || name == "cy" ? " px" : "";
+}
+
 std::string found_text(const std::vector<mapping::CameraFinding>& findings) {
   std::string text;
   for (const mapping::CameraFinding& f : findings) {
     if (f.used)
-      text += fmt::format("{}{} {:.5g} +- {:.2g} in place of {:.5g}", text.empty() ? "" : ", ", f.name,
-                          f.found, f.sigma, f.given);
+      text += fmt::format("{}{} {:.5g} +- {:.2g}{} in place of {:.5g}", text.empty() ? "" : ", ", f.name,
+                          f.found, f.sigma, unit_of(f.name), f.given);
   }
   return text;
 }
