@@ -82,14 +82,19 @@ def without_foreign(arguments):
     return kept[compiler:]
 
 
+def compiles(file, source):
+    """Whether the file is that source, or a unity source that includes it."""
+    return file == source or ("Unity" in file.parts and file.exists() and f'"{source}"' in file.read_text())
+
+
 def database(root, build, sources):
-    """Compile commands for single sources, with the flags of the closest target."""
+    """Compile commands for single sources, with the flags of their target, or of the closest one."""
     commands = list(commands_of(build))
     entries = []
     for source in sources:
         def closeness(command, folder=(build / source).parent):
             return len(os.path.commonpath([str(command[0].parent), str(folder)]))
-        exact = [command for command in commands if command[0] == root / source]
+        exact = [command for command in commands if compiles(command[0], root / source)]
         file, folder, arguments = (exact or [max(commands, key=closeness)])[0]
         entries.append({"file": str(root / source), "directory": folder,
                         "arguments": [a for a in without_foreign(arguments) if a != str(file)] +

@@ -6,8 +6,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <map>
 #include <mutex>
+#include <thread>
 #include <utility>
 
 #include "keys.hpp"
@@ -19,6 +21,7 @@ namespace {
 
 constexpr const char* kHubs = "_hub";  ///< partition for messages between hubs; no robot may have this name
 constexpr const char* kEverybody = "*";
+constexpr std::chrono::milliseconds kLinger{1000};
 
 struct Topic {
   const dds_topic_descriptor_t& type;
@@ -84,6 +87,9 @@ class Participant {
   Participant& operator=(const Participant&) = delete;
   ~Participant() {
     participant_ = Entity();
+    // CycloneDDS 0.10 may abort the process at the other end of a TCP connection that is closed while it
+    // still writes there: what it answers to the farewell must arrive before the connection is closed.
+    if (lingers_) std::this_thread::sleep_for(kLinger);
     domain_ = Entity();
     // Its log must not outlive it; by default CycloneDDS would write to stderr.
     dds_set_log_sink(&report, nullptr);
@@ -91,6 +97,7 @@ class Participant {
   }
 
   core::Result<void> open(const NetworkOptions& options, bool hub) {
+    lingers_ = options.transport == Transport::kTcp;
     const auto id = static_cast<dds_domainid_t>(options.domain);
     domain_ = Entity(dds_create_domain(id, domain_configuration(options, hub).c_str()));
     const auto qos = participant_qos(options);
@@ -153,6 +160,7 @@ class Participant {
   Entity participant_;
   dds_entity_t waitset_ = 0;
   dds_entity_t others_ = 0;
+  bool lingers_ = false;
 };
 
 /// Calls use(sample, info) for at most `most` available samples.

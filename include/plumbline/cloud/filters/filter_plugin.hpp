@@ -59,6 +59,7 @@ core::Result<void> load_filter_plugin(const std::filesystem::path& file, FilterR
 }  // namespace plumbline::cloud
 
 /// Followed by the body of a function that adds filters to `registry`.
+// NOLINTBEGIN(bugprone-macro-parentheses): a parameter's name cannot stand in parentheses.
 #define PLUMBLINE_FILTER_PLUGIN(registry)                                                           \
   static void plumbline_add_filters(plumbline::cloud::FilterRegistry& registry);                    \
   extern "C" __attribute__((visibility("default"))) const plumbline::cloud::FilterPlugin*           \
@@ -70,3 +71,4 @@ core::Result<void> load_filter_plugin(const std::filesystem::path& file, FilterR
     return &plugin;                                                                                 \
   }                                                                                                 \
   static void plumbline_add_filters(plumbline::cloud::FilterRegistry& registry)
+// NOLINTEND(bugprone-macro-parentheses)
