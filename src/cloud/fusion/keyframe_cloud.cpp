@@ -56,10 +56,9 @@ class PointMaker {
   PointMaker(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera,
              const KeyframeCloudOptions& options)
       : frame_(frame),
-        stride_(options.stride_px),
+        stride_(options.stride(frame.depth.cols)),
         base_(static_cast<float>(options.base_px)),
-        longest_(
-            std::clamp(static_cast<int>(std::lround(1.75 * options.base_px / options.stride_px)), 2, 250)),
+        longest_(std::clamp(static_cast<int>(std::lround(1.75 * options.base_px / stride_)), 2, 250)),
         fx_(static_cast<float>(camera.fx)),
         fy_(static_cast<float>(camera.fy)),
         cx_(static_cast<float>(camera.cx)),
@@ -169,7 +168,8 @@ class PointMaker {
 }  // namespace
 
 void KeyframeCloudOptions::declare(core::OptionTable& table) {
-  table.integer("stride", stride_px, {1, 16}, "px", "One point per stride x stride pixels");
+  table.integer("stride", stride_px, {0, 16}, "px",
+                "One point per stride x stride pixels; 0: 2, or more in images wider than 1100 px");
   table.number("min_depth", min_depth_m, {0.05, 20.0}, "m", "Smallest depth of points");
   table.number("max_depth", max_depth_m, {0.1, 20.0}, "m", "Largest depth of points");
   table.integer("smooth", smooth_px, {1, 31}, "px", "Window of the edge-aware mean of inverse depth, odd");
@@ -177,6 +177,12 @@ void KeyframeCloudOptions::declare(core::OptionTable& table) {
                 "Move points onto the edge-aware mean of the depth around them, wider where it is noisier; "
                 "off: raw measurements");
   table.number("base", base_px, {2.0, 60.0}, "px", "Half base of the differences for normals at 2 m");
+}
+
+int KeyframeCloudOptions::stride(int width) const {
+  constexpr double kWidthPerStride = 440.0;
+  if (stride_px > 0) return stride_px;
+  return std::max(2, static_cast<int>(std::lround(width / kWidthPerStride)));
 }
 
 CloudPtr organised_cloud(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera,

@@ -32,9 +32,10 @@ class LeftOut {
     const auto most = static_cast<float>(options.max_depth_m);
     std::size_t measured = 0;
     std::size_t within = 0;
-    for (int v = 0; v < depth.rows; v += options.stride_px) {
+    const int stride = options.stride(depth.cols);
+    for (int v = 0; v < depth.rows; v += stride) {
       const float* row = depth.ptr<float>(v);
-      for (int u = 0; u < depth.cols; u += options.stride_px) {
+      for (int u = 0; u < depth.cols; u += stride) {
         measured += row[u] > 0.0F ? 1U : 0U;
         within += row[u] >= least && row[u] <= most ? 1U : 0U;
       }

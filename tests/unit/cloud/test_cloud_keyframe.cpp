@@ -85,6 +85,17 @@ TEST(KeyframeCloud, PlaneNormalsAreExactWithoutNoiseUpToTheBorder) {
   }
 }
 
+TEST(KeyframeCloud, TheStrideFollowsTheWidthUnlessItIsGiven) {
+  KeyframeCloudOptions options;
+  EXPECT_EQ(options.stride(320), 2);
+  EXPECT_EQ(options.stride(640), 2);
+  EXPECT_EQ(options.stride(848), 2);
+  EXPECT_EQ(options.stride(1280), 3);
+  EXPECT_EQ(options.stride(1920), 4);
+  options.stride_px = 1;
+  EXPECT_EQ(options.stride(1920), 1);
+}
+
 TEST(KeyframeCloud, NormalsUnderStructuredLightNoiseAreWithinADegree) {
   for (const double angle : {0.0, 30.0, 50.0}) {
     for (const double distance : {1.0, 2.0, 3.0}) {

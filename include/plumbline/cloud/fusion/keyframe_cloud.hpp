@@ -10,7 +10,7 @@
 namespace plumbline::cloud {
 
 struct KeyframeCloudOptions {
-  int stride_px = 2;         ///< one point per stride x stride pixels
+  int stride_px = 0;         ///< one point per stride x stride pixels; 0: chosen by the image's width
   double min_depth_m = 0.2;  ///< measurements outside [min, max] are no points
   double max_depth_m = 8.0;
   int smooth_px = 7;            ///< window of the edge-aware mean before differences are taken, odd
@@ -18,6 +18,10 @@ struct KeyframeCloudOptions {
   double base_px = 12.0;  ///< half base of the differences at 2 m; grows and shrinks with sigma_z(z) / z
 
   void declare(core::OptionTable& table);
+  /// The stride in an image of that width in pixels: `stride_px`, or if that is 0 one that leaves about as
+  /// many points as 2 does in an image of 640 x 480: 2 up to 1100 px, 3 for 1280, 4 for 1920. Voxels average
+  /// over several points in any case; more of them cost time and make the cloud no better.
+  [[nodiscard]] int stride(int width) const;
 };
 
 /// Organised cloud, width / stride by height / stride (rounded up), camera frame, point (i, j) the
