@@ -419,6 +419,7 @@ void Slam::recalibrate(const sensor::Camera& camera, const PictureReader& read) 
   commit_bundles();
 
   std::vector<maps::FramePose> frames = frames_.poses();
+  const geometry::Trajectory path_before = maps::trajectory(frames, map_);
   recalibrate_map(change, map_, frames);
   const SurfaceMeasurement how{options_.mapper.surface, options_.mapper.edge_min_overlap,
                                options_.mapper.edge_photometric};
@@ -427,6 +428,7 @@ void Slam::recalibrate(const sensor::Camera& camera, const PictureReader& read) 
   GlobalAdjustmentOptions adjustment;
   adjustment.noise.orb_scale_factor = options_.tracker.association.scale_factor;
   adjust_recalibrated_map(image_, options_.mapper.fusion, adjustment, map_);
+  solve_frames_again(change.after(), map_, frames_.poses(), path_before, executor_, frames);
 
   frames_ = FrameTrajectory(std::move(frames));
   tracker_.recalibrate(change);

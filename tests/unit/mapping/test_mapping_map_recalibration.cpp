@@ -120,6 +120,73 @@ TEST(MapRecalibration, AMapOfTheWrongCameraBecomesThatOfTheRightOne) {
   EXPECT_LT(largest_difference(wall.poses(), poses), 0.002);
 }
 
+/// Ten frames between the first two keyframes of a wall, whose corrected poses drift away from their
+/// keyframe.
+struct FramesBetween {
+  FilmedWall wall;
+  std::vector<maps::FramePose> before;
+  std::vector<maps::FramePose> corrected;
+  std::vector<Rigid3> truth;  ///< camera_from_reference
+
+  explicit FramesBetween(std::size_t seen_points) {
+    const core::KeyframeId first = wall.keyframes[0];
+    const Rigid3& from_world = wall.world.map.camera_from_world(first);
+    for (int i = 1; i <= 10; ++i) {
+      const Rigid3 moved(Eigen::Matrix3d::Identity(), Eigen::Vector3d(-0.009 * i, 0.0, -0.009 * i));
+      const Rigid3 drift(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0.0007 * i, 0.0, -0.0005 * i));
+      maps::FramePose frame;
+      frame.stamp = 0.1 * i / 11.0;
+      frame.reference = first;
+      frame.tracked = true;
+      auto seen = std::make_shared<maps::SeenPoints>();
+      const Rigid3 camera_from_world = moved * from_world;
+      for (std::size_t k = 0; k < std::min(seen_points, wall.world.points.size()); ++k) {
+        const Eigen::Vector3d p = camera_from_world * wall.world.points[k];
+        seen->points.push_back({wall.world.map.point_ids()[k], wall.world.camera.project(p).cast<float>(),
+                                static_cast<float>(p.z()), 0.5F});
+      }
+      frame.seen = std::move(seen);
+      if (i > 1) frame.camera_from_previous = moved * truth.back().inverse();
+      frame.step_sigma_m = 0.001;
+      truth.push_back(moved);
+      frame.camera_from_reference = drift * drift * moved;
+      before.push_back(frame);
+      frame.camera_from_reference = drift * moved;
+      corrected.push_back(frame);
+    }
+  }
+  /// Largest error of a pose after they were solved again.
+  [[nodiscard]] double solved(const core::Executor& executor) {
+    const geometry::Trajectory path = maps::trajectory(before, wall.world.map);
+    solve_frames_again({wall.world.camera, wall.given()}, wall.world.map, before, path, executor, corrected);
+    std::vector<Rigid3> poses;
+    for (const maps::FramePose& frame : corrected) poses.push_back(frame.camera_from_reference);
+    return largest_difference(poses, truth);
+  }
+};
+
+TEST(MapRecalibration, FramesBetweenKeyframesFollowWhatTheySaw) {
+  EXPECT_LT(FramesBetween(60).solved(core::Executor(1)), 0.001);
+}
+
+// With too few landmarks the corrected poses and the tracker's steps are all there is.
+TEST(MapRecalibration, FramesThatSawLittleStayNearTheirCorrectedPose) {
+  FramesBetween few(5);
+  const double off = few.solved(core::Executor(1));
+  EXPECT_GT(off, 0.0005);
+  EXPECT_LT(off, 0.0075);
+}
+
+TEST(MapRecalibration, FramesAreSolvedToTheSameBytesByAnyNumberOfThreads) {
+  FramesBetween one(60);
+  FramesBetween two(60);
+  EXPECT_EQ(one.solved(core::Executor(1)), two.solved(core::Executor(2)));
+  for (std::size_t i = 0; i < one.corrected.size(); ++i) {
+    EXPECT_EQ(one.corrected[i].camera_from_reference.translation,
+              two.corrected[i].camera_from_reference.translation);
+  }
+}
+
 // A depth image that was taken later than was believed shows the wall nearer than the colour image's camera
 // had it.
 TEST(MapRecalibration, ADelayOfDepthMovesSurfacesAlongTheirRays) {

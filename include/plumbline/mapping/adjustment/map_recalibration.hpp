@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "plumbline/core/executor.hpp"
+#include "plumbline/geometry/trajectory.hpp"
 #include "plumbline/mapping/adjustment/global_adjustment.hpp"
 #include "plumbline/mapping/local_mapping/landmark_fusion.hpp"
 #include "plumbline/maps/frame_pose.hpp"
@@ -45,5 +46,13 @@ void measure_surfaces_again(const sensor::Pinhole& camera, const std::vector<map
 /// reject some; then the whole map is adjusted.
 GlobalAdjustmentSummary adjust_recalibrated_map(const sensor::Pinhole& camera, const FusionOptions& fusion,
                                                 const GlobalAdjustmentOptions& adjustment, maps::Map& map);
+
+/// Solves the poses of frames between keyframes again, from the landmarks that each of them saw
+/// (FramePose::seen) and its pose as recalibrate_map left it, which counts for less the more it was
+/// corrected. `model`: the camera believed now; `before`, `path_before`: the same frames and their path
+/// before recalibrate_map. The map is not changed.
+void solve_frames_again(const sensor::ImageModel& model, const maps::Map& map,
+                        const std::vector<maps::FramePose>& before, const geometry::Trajectory& path_before,
+                        const core::Executor& executor, std::vector<maps::FramePose>& frames);
 
 }  // namespace plumbline::mapping

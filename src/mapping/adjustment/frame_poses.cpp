@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <map>
+
+#include "plumbline/features/measurement.hpp"
+#include "plumbline/geometry/velocity.hpp"
+#include "plumbline/mapping/adjustment/map_recalibration.hpp"
+#include "plumbline/mapping/adjustment/observation_noise.hpp"
+#include "plumbline/optimize/pose_graph.hpp"
+#include "plumbline/optimize/pose_solver.hpp"
+#include "plumbline/sensor/depth_noise.hpp"
+
+namespace plumbline::mapping {
+namespace {
+
+using geometry::Rigid3;
+
+constexpr std::size_t kLeastPoints = 12;  // fewer leave the pose as it was corrected
+
+/// The landmarks that a frame saw, as the present camera measured them.
+std::vector<optimize::PointTerm> terms_of(const maps::SeenPoints& seen, const maps::Map& map,
+                                          const sensor::ImageModel& model, const Rigid3& camera_from_world,
+                                          const geometry::Vector6d& velocity) {
+  static const ObservationNoise noise;
+  const geometry::Vector6d shutter = model.camera().readout_s.value_or(0.0) * velocity;
+  const double late_s = model.camera().depth_delay_s - seen.depth_delay_s;
+
+  std::vector<optimize::PointTerm> terms;
+  for (const maps::SeenPoint& s : seen.points) {
+    const maps::MapPoint* point = map.find(s.point);
+    if (point == nullptr) continue;
+    const auto feature =
+        features::feature_of({s.pixel.cast<double>(), static_cast<double>(s.depth)}, shutter, model);
+
+    optimize::PointTerm term;
+    term.world = point->position;
+    term.pixel = feature.pixel;
+    term.pixel_sigma = static_cast<double>(s.sigma_px);
+    if (feature.depth > 0.0) {
+      const double rate = features::depth_rate(camera_from_world * point->position,
+                                               camera_from_world.rotation * point->normal, velocity);
+      term.depth = feature.depth - late_s * rate;
+      term.depth_sigma = noise.depth_factor * sensor::depth_sigma(term.depth);
+    }
+    terms.push_back(term);
+  }
+  return terms;
+}
+
+/// A corrected pose is as uncertain as half of its correction, and never better known than the noise.
+optimize::PosePrior prior_of(const Rigid3& camera_from_world, const Rigid3& correction) {
+  constexpr double kLeastSigma_m = 0.001;
+  constexpr double kLeastSigma_rad = 0.0005;
+  const geometry::Vector6d moved = geometry::log_se3(correction);
+  const double sigma_m = std::max(kLeastSigma_m, 0.5 * moved.head<3>().norm());
+  const double sigma_rad = std::max(kLeastSigma_rad, 0.5 * moved.tail<3>().norm());
+
+  optimize::PosePrior prior;
+  prior.camera_from_world = camera_from_world;
+  prior.information.diagonal().head<3>().setConstant(1.0 / (sigma_m * sigma_m));
+  prior.information.diagonal().tail<3>().setConstant(1.0 / (sigma_rad * sigma_rad));
+  return prior;
+}
+
+/// Belief about the pose of a frame relative to its keyframe, from the landmarks that it saw and its
+/// corrected pose.
+optimize::GraphEdge belief_of(const maps::FramePose& frame, const Rigid3& before,
+                              const sensor::ImageModel& model, const maps::Map& map,
+                              const geometry::Vector6d& velocity) {
+  const Rigid3& reference_from_world = map.camera_from_world(frame.reference);
+  const Rigid3 start = frame.camera_from_reference * reference_from_world;
+  optimize::PoseProblem problem;
+  problem.camera = model.image();
+  if (frame.seen != nullptr) problem.points = terms_of(*frame.seen, map, model, start, velocity);
+  if (problem.points.size() < kLeastPoints) problem.points.clear();
+  problem.prior = prior_of(start, frame.camera_from_reference * before.inverse());
+  const optimize::PoseSummary solved = optimize::solve_pose(problem, start, {});
+
+  optimize::GraphEdge belief;
+  belief.b_from_a = solved.camera_from_world * reference_from_world.inverse();
+  belief.information = solved.information + problem.prior->information;
+  return belief;
+}
+
+/// The tracker's own step from the frame before, which is known better than either pose.
+optimize::GraphEdge step_of(const maps::FramePose& frame) {
+  constexpr double kLeastSigma_m = 0.0002;
+  const double sigma_m = std::max(kLeastSigma_m, frame.step_sigma_m);
+  optimize::GraphEdge step;
+  step.b_from_a = *frame.camera_from_previous;
+  step.information.diagonal().head<3>().setConstant(1.0 / (sigma_m * sigma_m));
+  step.information.diagonal().tail<3>().setConstant(4.0 / (sigma_m * sigma_m));
+  return step;
+}
+
+}  // namespace
+
+void solve_frames_again(const sensor::ImageModel& model, const maps::Map& map,
+                        const std::vector<maps::FramePose>& before, const geometry::Trajectory& path_before,
+                        const core::Executor& executor, std::vector<maps::FramePose>& frames) {
+  const auto has_pose = [&](const maps::FramePose& f) { return f.tracked && map.has_keyframe(f.reference); };
+  const auto is_keyframe = [&](const maps::FramePose& f) {
+    return map.keyframe(f.reference).stamp == f.stamp;
+  };
+
+  std::vector<optimize::GraphEdge> beliefs(frames.size());
+  executor.parallel_for(frames.size(), [&](std::size_t i) {
+    if (!has_pose(frames[i]) || is_keyframe(frames[i])) return;
+    beliefs[i] = belief_of(frames[i], before[i].camera_from_reference, model, map,
+                           geometry::velocity_at(path_before, frames[i].stamp));
+  });
+
+  optimize::PoseGraph graph;
+  std::map<core::KeyframeId, int> node_of;
+  for (const core::KeyframeId id : map.keyframe_ids()) {
+    node_of[id] = static_cast<int>(graph.poses.size());
+    graph.poses.push_back({map.camera_from_world(id), true});
+  }
+
+  std::vector<int> nodes(frames.size(), -1);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const maps::FramePose& frame = frames[i];
+    if (!has_pose(frame)) continue;
+    const int reference = node_of.at(frame.reference);
+    nodes[i] = reference;
+    if (!is_keyframe(frame)) {
+      nodes[i] = static_cast<int>(graph.poses.size());
+      graph.poses.push_back({beliefs[i].b_from_a * map.camera_from_world(frame.reference), false});
+      beliefs[i].a = reference;
+      beliefs[i].b = nodes[i];
+      graph.edges.push_back(beliefs[i]);
+    }
+    if (i == 0 || nodes[i - 1] < 0 || !frame.camera_from_previous || nodes[i] == nodes[i - 1]) continue;
+    optimize::GraphEdge step = step_of(frame);
+    step.a = nodes[i - 1];
+    step.b = nodes[i];
+    graph.edges.push_back(step);
+  }
+
+  if (!optimize::solve_pose_graph(graph, false).usable) return;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (nodes[i] < 0 || is_keyframe(frames[i])) continue;
+    frames[i].camera_from_reference = graph.poses[static_cast<std::size_t>(nodes[i])].camera_from_world *
+                                      map.camera_from_world(frames[i].reference).inverse();
+  }
+}
+
+}  // namespace plumbline::mapping
