@@ -88,8 +88,9 @@ void save(const cv::Mat& before, const cv::Mat& after, const fs::path& file) {
   }
 }
 
-void run(const fs::path& source, const std::vector<std::string>& wanted) {
+void run(const fs::path& folder, const std::vector<std::string>& wanted) {
   const core::Executor executor;
+  const fs::path source = fs::absolute(folder);  // the working folder changes below
   const fs::path scratch = fs::temp_directory_path() / "plumbline_filter_pictures";
   fs::create_directories(scratch);
   const cloud::CloudPtr cloud = film(source / "pipelines", executor);

@@ -57,6 +57,7 @@ def changed_sources(root):
     if lines is None:
         return None
     changes = [line.split("\t") for line in lines]
+    changes += [("1", "0", name) for name in git(root, "ls-files", "-o", "--exclude-standard", "src", "maps", "viz")]
     sources = [(int(added) + int(removed), now(name)) for added, removed, name in changes if added + removed != "00"]
     sources = [(count, name) for count, name in sources if name.endswith(".cpp") and (root / name).exists()]
     return [name for _, name in sorted(sources, reverse=True)]
@@ -117,7 +118,7 @@ def check_tidy(root, build):
                                  capture_output=True, text=True)
             if run.returncode != 0:
                 failed.append(source)
-                print(run.stdout)
+                print(f"{source}:\n{run.stdout}")
     print(f"{len(looked_at)} changed sources, {len(failed)} with problems; left out: {', '.join(left_out) or 'none'}")
     return 1 if failed else 0
 

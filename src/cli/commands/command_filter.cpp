@@ -133,6 +133,11 @@ int list_filters(Session& session) {
 core::Result<void> describe_filter(const std::string& name, const Session& session) {
   const auto registry = session.filters();
   if (!registry) return tl::unexpected<core::Error>(registry.error());
+  if (name.empty()) {
+    fmt::print("{}", cloud::filters_reference(*registry));
+    return {};
+  }
+
   const cloud::FilterInfo* info = registry->find(name);
   if (info == nullptr) {
     return core::usage_error(
@@ -173,9 +178,11 @@ void add_filter(CLI::App& app, Session& session) {
       session);
 
   const auto name = std::make_shared<std::string>();
-  CLI::App* describe = add_command(*group, session, "describe", "Describe a filter: options and an example",
-                                   [&session, name] { return describe_filter(*name, session); });
-  describe->add_option("NAME", *name, "Type of the filter")->required();
+  CLI::App* describe = add_command(
+      *group, session, "describe",
+      "Describe a filter: options and an example; without NAME print the reference of all filters",
+      [&session, name] { return describe_filter(*name, session); });
+  describe->add_option("NAME", *name, "Type of the filter");
   add_plugin_option(*describe, session);
 
   CLI::App* check =

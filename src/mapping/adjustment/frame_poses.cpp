@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <map>
+#include <utility>
 
 #include "plumbline/features/measurement.hpp"
 #include "plumbline/geometry/velocity.hpp"
@@ -29,6 +30,7 @@ std::vector<optimize::PointTerm> terms_of(const maps::SeenPoints& seen, const ma
   for (const maps::SeenPoint& s : seen.points) {
     const maps::MapPoint* point = map.find(s.point);
     if (point == nullptr) continue;
+
     const auto feature =
         features::feature_of({s.pixel.cast<double>(), static_cast<double>(s.depth)}, shutter, model);
 
@@ -36,6 +38,7 @@ std::vector<optimize::PointTerm> terms_of(const maps::SeenPoints& seen, const ma
     term.world = point->position;
     term.pixel = feature.pixel;
     term.pixel_sigma = static_cast<double>(s.sigma_px);
+
     if (feature.depth > 0.0) {
       const double rate = features::depth_rate(camera_from_world * point->position,
                                                camera_from_world.rotation * point->normal, velocity);
@@ -44,6 +47,7 @@ std::vector<optimize::PointTerm> terms_of(const maps::SeenPoints& seen, const ma
     }
     terms.push_back(term);
   }
+
   return terms;
 }
 
@@ -69,6 +73,7 @@ optimize::GraphEdge belief_of(const maps::FramePose& frame, const Rigid3& before
                               const geometry::Vector6d& velocity) {
   const Rigid3& reference_from_world = map.camera_from_world(frame.reference);
   const Rigid3 start = frame.camera_from_reference * reference_from_world;
+
   optimize::PoseProblem problem;
   problem.camera = model.image();
   if (frame.seen != nullptr) problem.points = terms_of(*frame.seen, map, model, start, velocity);
@@ -93,55 +98,76 @@ optimize::GraphEdge step_of(const maps::FramePose& frame) {
   return step;
 }
 
+bool has_pose(const maps::FramePose& frame, const maps::Map& map) {
+  return frame.tracked && map.has_keyframe(frame.reference);
+}
+
+bool is_between(const maps::FramePose& frame, const maps::Map& map) {
+  return has_pose(frame, map) && map.keyframe(frame.reference).stamp != frame.stamp;
+}
+
+/// Frames between keyframes, which stay where they are, tied to these by beliefs and to each other by steps.
+struct FrameChain {
+  optimize::PoseGraph graph;
+  std::vector<int> nodes;  ///< of each frame; that of its keyframe for those that became one; -1: no pose
+};
+
+FrameChain chain_of(const std::vector<maps::FramePose>& frames, const maps::Map& map,
+                    const std::vector<optimize::GraphEdge>& beliefs) {
+  FrameChain chain;
+  std::map<core::KeyframeId, int> keyframes;
+  for (const core::KeyframeId id : map.keyframe_ids()) {
+    keyframes[id] = static_cast<int>(chain.graph.poses.size());
+    chain.graph.poses.push_back({map.camera_from_world(id), true});
+  }
+
+  const auto tie = [&chain](optimize::GraphEdge edge, int a, int b) {
+    edge.a = a;
+    edge.b = b;
+    chain.graph.edges.push_back(edge);
+  };
+
+  int previous = -1;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    int node = has_pose(frames[i], map) ? keyframes.at(frames[i].reference) : -1;
+
+    // Its belief.
+    if (is_between(frames[i], map)) {
+      const int keyframe = std::exchange(node, static_cast<int>(chain.graph.poses.size()));
+      chain.graph.poses.push_back({beliefs[i].b_from_a * map.camera_from_world(frames[i].reference), false});
+      tie(beliefs[i], keyframe, node);
+    }
+
+    // Its step.
+    if (node >= 0 && previous >= 0 && node != previous && frames[i].camera_from_previous)
+      tie(step_of(frames[i]), previous, node);
+    chain.nodes.push_back(node);
+    previous = node;
+  }
+
+  return chain;
+}
+
 }  // namespace
 
 void solve_frames_again(const sensor::ImageModel& model, const maps::Map& map,
                         const std::vector<maps::FramePose>& before, const geometry::Trajectory& path_before,
                         const core::Executor& executor, std::vector<maps::FramePose>& frames) {
-  const auto has_pose = [&](const maps::FramePose& f) { return f.tracked && map.has_keyframe(f.reference); };
-  const auto is_keyframe = [&](const maps::FramePose& f) {
-    return map.keyframe(f.reference).stamp == f.stamp;
-  };
-
   std::vector<optimize::GraphEdge> beliefs(frames.size());
   executor.parallel_for(frames.size(), [&](std::size_t i) {
-    if (!has_pose(frames[i]) || is_keyframe(frames[i])) return;
+    if (!is_between(frames[i], map)) return;
     beliefs[i] = belief_of(frames[i], before[i].camera_from_reference, model, map,
                            geometry::velocity_at(path_before, frames[i].stamp));
   });
 
-  optimize::PoseGraph graph;
-  std::map<core::KeyframeId, int> node_of;
-  for (const core::KeyframeId id : map.keyframe_ids()) {
-    node_of[id] = static_cast<int>(graph.poses.size());
-    graph.poses.push_back({map.camera_from_world(id), true});
-  }
+  FrameChain chain = chain_of(frames, map, beliefs);
+  if (!optimize::solve_pose_graph(chain.graph, false).usable) return;
 
-  std::vector<int> nodes(frames.size(), -1);
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    const maps::FramePose& frame = frames[i];
-    if (!has_pose(frame)) continue;
-    const int reference = node_of.at(frame.reference);
-    nodes[i] = reference;
-    if (!is_keyframe(frame)) {
-      nodes[i] = static_cast<int>(graph.poses.size());
-      graph.poses.push_back({beliefs[i].b_from_a * map.camera_from_world(frame.reference), false});
-      beliefs[i].a = reference;
-      beliefs[i].b = nodes[i];
-      graph.edges.push_back(beliefs[i]);
-    }
-    if (i == 0 || nodes[i - 1] < 0 || !frame.camera_from_previous || nodes[i] == nodes[i - 1]) continue;
-    optimize::GraphEdge step = step_of(frame);
-    step.a = nodes[i - 1];
-    step.b = nodes[i];
-    graph.edges.push_back(step);
-  }
-
-  if (!optimize::solve_pose_graph(graph, false).usable) return;
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    if (nodes[i] < 0 || is_keyframe(frames[i])) continue;
-    frames[i].camera_from_reference = graph.poses[static_cast<std::size_t>(nodes[i])].camera_from_world *
-                                      map.camera_from_world(frames[i].reference).inverse();
+    if (!is_between(frames[i], map)) continue;
+    const auto node = static_cast<std::size_t>(chain.nodes[i]);
+    frames[i].camera_from_reference =
+        chain.graph.poses[node].camera_from_world * map.camera_from_world(frames[i].reference).inverse();
   }
 }
 
