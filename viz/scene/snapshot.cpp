@@ -14,11 +14,13 @@
 #include <vtkTransform2D.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <memory>
 #include <opencv2/imgproc.hpp>
 #include <utility>
+#include <vector>
 
 #include "canvas/offscreen.hpp"
 #include "canvas/png_writer.hpp"
@@ -243,6 +245,10 @@ cv::Mat3b composited(const cv::Mat4b& below, const cv::Mat4b& over) {
     const cv::Vec4b *under = below[y], *top = over[y];
     cv::Vec3b* to = result[y];
     for (int x = 0; x < result.cols; ++x) {
+      if (top[x] == cv::Vec4b(0, 0, 0, 0)) {
+        to[x] = {under[x][0], under[x][1], under[x][2]};
+        continue;
+      }
       const int through = 255 - top[x][3];
       for (int c = 0; c < 3; ++c)
         to[x][c] = static_cast<std::uint8_t>(std::min(255, top[x][c] + (under[x][c] * through + 127) / 255));
@@ -252,15 +258,28 @@ cv::Mat3b composited(const cv::Mat4b& below, const cv::Mat4b& over) {
 }
 
 /// Draws picture after picture, in the same window as long as they are of the same size: VTK's shaders are
-/// compiled once.
+/// compiled once. This thread draws what VTK draws; points are drawn beside it, a few bands at a time.
 class Renderer {
  public:
-  core::Result<cv::Mat3b> draw(const Scene& scene, const SnapshotOptions& options, const Drawn& drawn) {
-    Band band;
-    band.height = kSupersampling * std::min(kBand_px, options.height_px) + 2 * kMargin;
-    if (auto opened = open({kSupersampling * options.width_px, band.height}); !opened)
-      return tl::unexpected(opened.error());
+  explicit Renderer(const core::Executor& executor) : executor_(executor) {}
 
+  core::Result<void> open(const SnapshotOptions& options) {
+    const cv::Size size{kSupersampling * options.width_px, band_height(options)};
+    if (window_ != nullptr && size == size_) return {};
+    window_.reset();
+    rasters_.clear();
+    auto window = OffscreenWindow::open(size.width, size.height);
+    if (!window) return tl::unexpected(window.error());
+    window_ = std::move(*window);
+    size_ = size;
+    for (std::size_t i = 0; i < kAtATime; ++i) rasters_.emplace_back(size.width, size.height);
+    return {};
+  }
+
+  /// In the window that is open.
+  cv::Mat3b draw(const Scene& scene, const SnapshotOptions& options, const Drawn& drawn) {
+    Band band;
+    band.height = size_.height;
     vtkNew<vtkRenderer> renderer;
     renderer->SetBackground(0.0, 0.0, 0.0);
     renderer->SetBackgroundAlpha(0.0);
@@ -273,41 +292,45 @@ class Renderer {
     actor->GetScene()->AddItem(overlay);
     renderer->AddActor(actor);
 
-    Raster raster(kSupersampling * options.width_px, band.height);
     cv::Mat3b picture(options.height_px, options.width_px);
+    std::array<core::Executor::Job, kAtATime> jobs;
 
-    for (int first_px = 0; first_px < picture.rows; first_px += kBand_px) {
+    for (int first_px = 0, k = 0; first_px < picture.rows; first_px += kBand_px, ++k) {
       band.first = kSupersampling * first_px - kMargin;
-      raster.clear(band.first, kBackground);
-      draw_band(scene, drawn, raster);
-      cv::Mat3b part = picture.rowRange(first_px, std::min(first_px + kBand_px, picture.rows));
-      const cv::Mat3b large = composited(raster.picture(), window_->draw())
-                                  .rowRange(kMargin, kMargin + kSupersampling * part.rows);
-      cv::resize(large, part, part.size(), 0.0, 0.0, cv::INTER_AREA);
+      const std::size_t place = static_cast<std::size_t>(k) % kAtATime;
+      jobs[place].wait();
+      jobs[place] = executor_.submit([&, first_px, first = band.first, &raster = rasters_[place],
+                                      over = window_->draw()] {
+        raster.clear(first, kBackground);
+        draw_band(scene, drawn, raster);
+        cv::Mat3b part = picture.rowRange(first_px, std::min(first_px + kBand_px, picture.rows));
+        const cv::Range rows(kMargin, kMargin + kSupersampling * part.rows);
+        cv::resize(composited(raster.picture().rowRange(rows), over.rowRange(rows)), part, part.size(), 0.0,
+                   0.0, cv::INTER_AREA);
+      });
     }
 
+    for (core::Executor::Job& job : jobs) job.wait();
     window_->window()->RemoveRenderer(renderer);
     return picture;
   }
 
  private:
-  core::Result<void> open(const cv::Size& size) {
-    if (window_ != nullptr && size == size_) return {};
-    window_.reset();
-    auto window = OffscreenWindow::open(size.width, size.height);
-    if (!window) return tl::unexpected(window.error());
-    window_ = std::move(*window);
-    size_ = size;
-    return {};
+  static constexpr std::size_t kAtATime = 2;  // bands, each of about 12 MB
+
+  static int band_height(const SnapshotOptions& options) {
+    return kSupersampling * std::min(kBand_px, options.height_px) + 2 * kMargin;
   }
 
+  const core::Executor& executor_;
   std::unique_ptr<OffscreenWindow> window_;
   cv::Size size_;
+  std::vector<Raster> rasters_;
 };
 
 }  // namespace
 
-/// Only this thread draws; selecting data and writing pictures run beside it.
+/// Only this thread calls VTK; selecting data, drawing points and writing pictures run beside it.
 core::Result<void> render_snapshots(const Scene& scene, const std::vector<Snapshot>& snapshots,
                                     const core::Executor& executor) {
   for (const Snapshot& snapshot : snapshots) {
@@ -325,17 +348,17 @@ core::Result<void> render_snapshots(const Scene& scene, const std::vector<Snapsh
         executor.submit([&, i] { drawn[i] = choose_what_to_draw(scene, snapshots[i].options); }));
   };
 
-  Renderer renderer;
+  Renderer renderer(executor);
   choose_next();
 
   for (std::size_t i = 0; i < snapshots.size(); ++i) {
+    if (auto opened = renderer.open(snapshots[i].options); !opened) return opened;
     choosing[i].wait();
     choose_next();
-    auto picture = renderer.draw(scene, snapshots[i].options, drawn[i]);
-    if (!picture) return tl::unexpected(picture.error());
+    const cv::Mat3b picture = renderer.draw(scene, snapshots[i].options, drawn[i]);
     drawn[i] = {};
     writing.push_back(
-        executor.submit([&, i, picture = *picture] { written[i] = write_png(picture, snapshots[i].file); }));
+        executor.submit([&, i, picture] { written[i] = write_png(picture, snapshots[i].file); }));
   }
 
   for (std::size_t i = 0; i < snapshots.size(); ++i) {
