@@ -14,11 +14,16 @@ void expect_own(bool own) {
   if (!own) throw BadBytes("it holds what belongs to another row");
 }
 
+template <typename Item>
+Page<Item> page_of(const Bytes& plain) {
+  return std::make_shared<const std::vector<Item>>(decode_page<Item>(plain));
+}
+
 template <typename Landmark>
-std::vector<Landmark> landmarks_of(const Bytes& plain, const MapRows::Key& key) {
-  std::vector<Landmark> landmarks = decode_page<Landmark>(plain);
-  for (const Landmark& landmark : landmarks) {
-    expect_own(landmark.id.robot == key.first && landmark.id.index / kLandmarksPerPage == key.second);
+Page<Landmark> landmarks_of(const Bytes& plain, std::int64_t robot, std::int64_t number) {
+  Page<Landmark> landmarks = page_of<Landmark>(plain);
+  for (const Landmark& landmark : *landmarks) {
+    expect_own(landmark.id.robot == robot && landmark.id.index / kLandmarksPerPage == number);
   }
   return landmarks;
 }
@@ -47,28 +52,55 @@ void check_frames(const std::vector<FramePose>& frames, const Map& map) {
 
 }  // namespace
 
-void MapRows::put(const std::string& table, const Key& key, const Bytes& plain,
-                  const std::vector<RobotInfo>& robots) {
-  if (table == "map") maps_[key] = decode<MapRow>(plain);
+RowContent decode_row(const std::string& table, std::int64_t robot, std::int64_t number, const Bytes& plain,
+                      const std::vector<RobotInfo>& robots) {
+  if (table == "map") return decode<MapRow>(plain);
   if (table == "keyframe") {
-    const sensor::Camera camera = camera_of(robots, static_cast<std::int32_t>(key.first));
-    auto keyframe = decode_keyframe(plain, camera.color);
-    expect_own(keyframe->id.robot == key.first && keyframe->id.index == key.second);
-    keyframes_[key] = std::move(keyframe);
+    auto keyframe = decode_keyframe(plain, camera_of(robots, static_cast<std::int32_t>(robot)).color);
+    expect_own(keyframe->id.robot == robot && keyframe->id.index == number);
+    return keyframe;
   }
 
-  if (table == "state") states_[key] = decode<KeyframeState>(plain);
-  if (table == "point") points_[key] = landmarks_of<MapPoint>(plain, key);
-  if (table == "line") lines_[key] = landmarks_of<MapLine>(plain, key);
+  if (table == "state") return decode<KeyframeState>(plain);
+  if (table == "point") return landmarks_of<MapPoint>(plain, robot, number);
+  if (table == "line") return landmarks_of<MapLine>(plain, robot, number);
 
   if (table == "edge") {
     const auto row = decode<EdgeRow>(plain);
-    expect_own(row.number == static_cast<std::uint64_t>(key.second));
-    edges_[key] = row.edge;
+    expect_own(row.number == static_cast<std::uint64_t>(number));
+    return row;
   }
 
-  if (table == "frame") frames_[key] = decode_page<FramePose>(plain);
-  if (table == "log") log_[key] = decode_page<std::string>(plain);
+  if (table == "frame") return page_of<FramePose>(plain);
+  if (table == "log") return page_of<std::string>(plain);
+  return {};
+}
+
+MapRows MapRows::read(Database& database, const std::vector<RobotInfo>& robots) {
+  MapRows all;
+  for (const char* table : {"map", "keyframe", "state", "point", "line", "edge", "frame", "log"}) {
+    each_row(database, table, [&](std::int64_t robot, std::int64_t number, const Bytes& plain) {
+      all.put({robot, number}, decode_row(table, robot, number, plain, robots));
+    });
+  }
+  return all;
+}
+
+void MapRows::put(const Key& key, RowContent content) {
+  struct Put {
+    MapRows& rows;
+    const Key& key;
+    void operator()(std::monostate /*none*/) const {}
+    void operator()(MapRow&& row) const { rows.maps_[key] = std::move(row); }
+    void operator()(std::shared_ptr<const Keyframe>&& row) const { rows.keyframes_[key] = std::move(row); }
+    void operator()(KeyframeState&& row) const { rows.states_[key] = row; }
+    void operator()(Page<MapPoint>&& row) const { rows.points_[key] = std::move(row); }
+    void operator()(Page<MapLine>&& row) const { rows.lines_[key] = std::move(row); }
+    void operator()(EdgeRow&& row) const { rows.edges_[key] = std::move(row.edge); }
+    void operator()(Page<FramePose>&& row) const { rows.frames_[key] = std::move(row); }
+    void operator()(Page<std::string>&& row) const { rows.log_[key] = std::move(row); }
+  };
+  std::visit(Put{*this, key}, std::move(content));
 }
 
 void MapRows::remove(const std::string& table, const Key& key) {
@@ -87,10 +119,10 @@ bool MapRows::is_of(const Key& key, std::int64_t robot) const {
 }
 
 template <typename Row>
-std::vector<Row> MapRows::gathered(const Table<std::vector<Row>>& pages, std::int64_t robot) const {
+std::vector<Row> MapRows::gathered(const Table<Page<Row>>& pages, std::int64_t robot) const {
   std::vector<Row> all;
   for (const auto& [key, page] : pages) {
-    if (is_of(key, robot)) all.insert(all.end(), page.begin(), page.end());
+    if (is_of(key, robot)) all.insert(all.end(), page->begin(), page->end());
   }
   return all;
 }
@@ -159,50 +191,42 @@ std::vector<StoredMap> MapRows::maps() const {
   return maps;
 }
 
-struct MapFollower::Impl {
-  MapRows rows;
-  std::vector<RobotInfo> robots;
-  std::int64_t head = 0;
-
-  void apply(const StoreRow& row) {
-    const RowTable& table = kRowTables[row.name.table];
-    const MapRows::Key key{row.name.robot, row.name.number};
-    if (row.removed) return rows.remove(table.name, key);
-    const bool header = std::string(table.name) == "header";
-    if (table.named && !(header && row.name.key == "robots")) return;
-    check_row(row.name, row.data, robots);  // adds new robots to `robots`, too
-    rows.put(table.name, key, unpack(row.data.data(), row.data.size()), robots);
-  }
-};
-
-MapFollower::MapFollower() : impl_(std::make_unique<Impl>()) {}
-MapFollower::MapFollower(MapFollower&& other) noexcept = default;
-MapFollower& MapFollower::operator=(MapFollower&& other) noexcept = default;
-MapFollower::~MapFollower() = default;
-
-std::int64_t MapFollower::head() const { return impl_->head; }
-
-core::Result<void> MapFollower::apply(const StoreTransaction& transaction) {
+core::Result<StoredMap> GrowingMap::map() const {
   try {
-    Bytes rows = transaction.rows;
-    consume_rows(rows, [&](const StoreRow& row, std::size_t) { impl_->apply(row); });
-    if (!rows.empty()) throw BadBytes("a row ends too early");
-  } catch (const BadBytes& bad) {
-    return core::input_error(std::string("rows of a map: ") + bad.what());
-  }
-  impl_->head = transaction.number;
-  return {};
-}
-
-core::Result<StoredMap> MapFollower::map() const {
-  try {
-    std::vector<StoredMap> maps = impl_->rows.maps();
+    if (!damage.empty()) throw BadBytes(damage);
+    std::vector<StoredMap> maps = rows.maps();
     if (maps.size() != 1) throw BadBytes("they are of several robots");
-    maps.front().header.robots = impl_->robots;
+    maps.front().header.robots = robots;
     return std::move(maps.front());
   } catch (const BadBytes& bad) {
     return core::input_error(std::string("rows of a map: ") + bad.what());
   }
+}
+
+MapFollower::MapFollower() : map_(std::make_unique<GrowingMap>()) {}
+MapFollower::MapFollower(const GrowingMap& map) : map_(std::make_unique<GrowingMap>(map)) {}
+MapFollower::MapFollower(MapFollower&& other) noexcept = default;
+MapFollower& MapFollower::operator=(MapFollower&& other) noexcept = default;
+MapFollower::~MapFollower() = default;
+
+std::int64_t MapFollower::head() const { return map_->head; }
+core::Result<StoredMap> MapFollower::map() const { return map_->map(); }
+
+core::Result<void> MapFollower::apply(const StoreTransaction& transaction) {
+  try {
+    Bytes rows = transaction.rows;
+    consume_rows(rows, [&](const StoreRow& row, std::size_t) {
+      const char* table = kRowTables[row.name.table].name;
+      const MapRows::Key key{row.name.robot, row.name.number};
+      if (row.removed) return map_->rows.remove(table, key);
+      map_->rows.put(key, check_row(row.name, row.data, map_->robots));
+    });
+    if (!rows.empty()) throw BadBytes("a row ends too early");
+  } catch (const BadBytes& bad) {
+    return core::input_error(std::string("rows of a map: ") + bad.what());
+  }
+  map_->head = transaction.number;
+  return {};
 }
 
 }  // namespace plumbline::maps

@@ -6,22 +6,35 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "store/store_codec.hpp"
+#include "store/store_sqlite.hpp"
 
 namespace plumbline::maps {
 
+/// Rows of one kind that share a row of the store; copies share the memory.
+template <typename Item>
+using Page = std::shared_ptr<const std::vector<Item>>;
+
+/// Content of a row of a map; none for rows of other tables.
+using RowContent = std::variant<std::monostate, MapRow, std::shared_ptr<const Keyframe>, KeyframeState,
+                                Page<MapPoint>, Page<MapLine>, EdgeRow, Page<FramePose>, Page<std::string>>;
+
+/// Decodes the unpacked bytes of a row. Throws BadBytes: they do not decode, or belong to another row.
+RowContent decode_row(const std::string& table, std::int64_t robot, std::int64_t number, const Bytes& plain,
+                      const std::vector<RobotInfo>& robots);
+
+/// Cheap to copy: keyframes and pages are shared.
 class MapRows {
  public:
-  using Key = std::pair<std::int64_t, std::int64_t>;  ///< robot, number
-  /// Tables of rows that are looked at here, those first that others need.
-  static constexpr const char* kTables[] = {"map",  "keyframe", "state", "point",
-                                            "line", "edge",     "frame", "log"};
+  /// All rows of a file. Throws BadBytes, StoreFailure.
+  static MapRows read(Database& database, const std::vector<RobotInfo>& robots);
 
-  /// Applies the present content of a row, unpacked; rows of other tables are skipped. Throws BadBytes.
-  void put(const std::string& table, const Key& key, const Bytes& plain,
-           const std::vector<RobotInfo>& robots);
+  using Key = std::pair<std::int64_t, std::int64_t>;  ///< robot, number
+  /// Applies the present content of a row; rows of other tables are skipped.
+  void put(const Key& key, RowContent content);
   void remove(const std::string& table, const Key& key);
   /// Each map that there is, by robot, without header: the only one, or each robot's own. Throws BadBytes:
   /// rows are missing or contradict each other.
@@ -31,7 +44,7 @@ class MapRows {
   template <typename Row>
   using Table = std::map<Key, Row>;
   template <typename Row>
-  [[nodiscard]] std::vector<Row> gathered(const Table<std::vector<Row>>& pages, std::int64_t robot) const;
+  [[nodiscard]] std::vector<Row> gathered(const Table<Page<Row>>& pages, std::int64_t robot) const;
   [[nodiscard]] StoredMap map(std::int64_t robot, const MapRow& row) const;
   /// True if a row belongs to the map of `robot`.
   [[nodiscard]] bool is_of(const Key& key, std::int64_t robot) const;
@@ -40,11 +53,22 @@ class MapRows {
   Table<MapRow> maps_;
   Table<std::shared_ptr<const Keyframe>> keyframes_;
   Table<KeyframeState> states_;
-  Table<std::vector<MapPoint>> points_;
-  Table<std::vector<MapLine>> lines_;
+  Table<Page<MapPoint>> points_;
+  Table<Page<MapLine>> lines_;
   Table<SurfaceEdge> edges_;
-  Table<std::vector<FramePose>> frames_;
-  Table<std::vector<std::string>> log_;
+  Table<Page<FramePose>> frames_;
+  Table<Page<std::string>> log_;
+};
+
+/// The rows of one robot's map as they arrive.
+struct GrowingMap {
+  MapRows rows;
+  std::vector<RobotInfo> robots;
+  std::int64_t head = 0;  ///< number of the last transaction applied
+  std::string damage;     ///< why rows cannot be read; empty: they can
+
+  /// With the robots as header. Errors as MapFollower::map().
+  [[nodiscard]] core::Result<StoredMap> map() const;
 };
 
 }  // namespace plumbline::maps

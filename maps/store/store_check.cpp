@@ -50,12 +50,9 @@ void check_next(const Ids& ids) {
   }
 }
 
-void check_keyframe(const Bytes& bytes, const RowName& name, const std::vector<RobotInfo>& robots) {
-  demand(!robots.empty(), "there is no camera");
-  const auto keyframe =
-      decode_keyframe(bytes, camera_of(robots, static_cast<std::int32_t>(name.robot)).color);
-  demand(keyframe->id.robot == name.robot && keyframe->id.index == name.number,
-         "it holds what belongs to another row");
+void check(std::monostate /*none*/) {}
+
+void check(const std::shared_ptr<const Keyframe>& keyframe) {
   demand(std::isfinite(keyframe->stamp) && std::isfinite(keyframe->turn_rate), "its stamp is not finite");
   check_id(keyframe->reference);
   check(keyframe->camera_from_reference);
@@ -66,12 +63,15 @@ void check_keyframe(const Bytes& bytes, const RowName& name, const std::vector<R
   }
 }
 
+void check(const KeyframeState& state) {
+  check(state.camera_from_world);
+  check_id(state.parent);
+}
+
 template <typename Landmark>
-void check_landmarks(const Bytes& bytes, const RowName& name) {
+void check_landmarks(const std::vector<Landmark>& landmarks) {
   std::int32_t last = -1;
-  for (const Landmark& landmark : decode_page<Landmark>(bytes)) {
-    demand(landmark.id.robot == name.robot && landmark.id.index / kLandmarksPerPage == name.number,
-           "it holds what belongs to another row");
+  for (const Landmark& landmark : landmarks) {
     demand(landmark.id.index > last, "a landmark is there twice");
     last = landmark.id.index;
     if constexpr (std::is_same_v<Landmark, MapPoint>) {
@@ -85,8 +85,11 @@ void check_landmarks(const Bytes& bytes, const RowName& name) {
   }
 }
 
-void check_frame_page(const Bytes& bytes) {
-  for (const FramePose& frame : decode_page<FramePose>(bytes)) {
+void check(const Page<MapPoint>& points) { check_landmarks(*points); }
+void check(const Page<MapLine>& lines) { check_landmarks(*lines); }
+
+void check(const Page<FramePose>& frames) {
+  for (const FramePose& frame : *frames) {
     demand(std::isfinite(frame.stamp), "a frame's stamp is not finite");
     check_id(frame.reference);
     if (!frame.tracked) continue;
@@ -95,12 +98,16 @@ void check_frame_page(const Bytes& bytes) {
   }
 }
 
+void check(const Page<std::string>& /*log*/) {}
+
 void check_edge(const KeyframeEdge& edge) {
   check_id(edge.a);
   check_id(edge.b);
   check(edge.b_from_a);
   demand(edge.information.allFinite(), "an edge is not finite");
 }
+
+void check(const EdgeRow& row) { check_edge(row.edge); }
 
 void check(const sensor::Camera& camera) {
   check(camera.color);
@@ -112,8 +119,7 @@ void check(const sensor::Camera& camera) {
   demand(std::isfinite(camera.depth_delay_s), "the camera is not finite");
 }
 
-void check_map(const Bytes& bytes) {
-  const MapRow row = decode<MapRow>(bytes);
+void check(const MapRow& row) {
   check_next(row.next.keyframes);
   check_next(row.next.points);
   check_next(row.next.lines);
@@ -167,33 +173,36 @@ void check_name(const RowName& name) {
   }
 }
 
-void check_row(const RowName& name, const Bytes& bytes, std::vector<RobotInfo>& robots) {
+RowContent check_row(const RowName& name, const Bytes& bytes, std::vector<RobotInfo>& robots) {
   check_name(name);
   const std::string table = kRowTables[name.table].name;
   const auto plain = [&](std::size_t most) { return unpack(bytes.data(), bytes.size(), most); };
-  if (table == "header") return check_header(name.key, bytes, robots);
-  if (table == "map") return check_map(plain(kMostPlain));
-  if (table == "keyframe") return check_keyframe(plain(kMostPlain), name, robots);
 
-  if (table == "state") {
-    const KeyframeState state = decode<KeyframeState>(plain(kMostSmall));
-    check(state.camera_from_world);
-    return check_id(state.parent);
+  // Rows of other tables.
+  if (table == "header") {
+    check_header(name.key, bytes, robots);
+    return {};
+  }
+  if (table == "attachment") {
+    plain(kMostPlain);
+    return {};
+  }
+  if (table == "surface") {
+    decode_surface(plain(kMostPlain));
+    return {};
+  }
+  if (table == "cloud" || table == "frame_cloud") {
+    check_cloud(bytes);
+    return {};
   }
 
-  if (table == "point") return check_landmarks<MapPoint>(plain(kMostPage), name);
-  if (table == "line") return check_landmarks<MapLine>(plain(kMostPage), name);
-  if (table == "edge") {
-    const auto row = decode<EdgeRow>(plain(kMostSmall));
-    demand(row.number == static_cast<std::uint64_t>(name.number), "it holds what belongs to another row");
-    return check_edge(row.edge);
-  }
-
-  if (table == "frame") return check_frame_page(plain(kMostPage));
-  if (table == "log") return void(decode_page<std::string>(plain(kMostPage)));
-  if (table == "attachment") return void(plain(kMostPlain));
-  if (table == "surface") return void(decode_surface(plain(kMostPlain)));
-  check_cloud(bytes);
+  const std::size_t most = table == "map" || table == "keyframe" ? kMostPlain
+                           : table == "state" || table == "edge" ? kMostSmall
+                                                                 : kMostPage;
+  if (table == "keyframe") demand(!robots.empty(), "there is no camera");
+  RowContent content = decode_row(table, name.robot, name.number, plain(most), robots);
+  std::visit([](const auto& row) { check(row); }, content);
+  return content;
 }
 
 }  // namespace plumbline::maps

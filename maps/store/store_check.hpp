@@ -4,6 +4,7 @@
 // Checks rows from a stranger before they are stored.
 #include <vector>
 
+#include "store/map_rows.hpp"
 #include "store/store_schema.hpp"
 
 namespace plumbline::maps {
@@ -19,9 +20,10 @@ struct RowName {
 /// Largest size of a packed row, bytes.
 constexpr std::size_t kMostRowBytes = 16U << 20U;
 
-/// Throws BadBytes with the reason: a key out of range, bytes that do not decode or that belong to another
-/// row, numbers that are not finite. Robots in the row of the header are added to `robots`.
-void check_row(const RowName& name, const Bytes& bytes, std::vector<RobotInfo>& robots);
+/// Decodes a row of a map. Throws BadBytes with the reason: a key out of range, bytes that do not decode or
+/// that belong to another row, numbers that are not finite. Robots in the row of the header are added to
+/// `robots`.
+RowContent check_row(const RowName& name, const Bytes& bytes, std::vector<RobotInfo>& robots);
 /// The same for a row that is removed.
 void check_name(const RowName& name);
 

@@ -15,22 +15,6 @@ namespace {
 
 using core::ErrorKind;
 
-/// Calls row(robot, number, bytes) for all rows of `table` by robot and number; what `row` dislikes is
-/// reported with the row's name.
-template <typename Row>
-void read_table(Database& database, const std::string& table, const Row& row) {
-  Statement rows(database, ("SELECT robot, number, data FROM " + table + " ORDER BY robot, number").c_str());
-  while (rows.step()) {
-    const std::int64_t robot = rows.integer(0);
-    const std::int64_t number = rows.integer(1);
-    try {
-      row(robot, number, rows.unpacked(2));
-    } catch (const BadBytes& bad) {
-      throw BadBytes(table + " " + std::to_string(robot) + "/" + std::to_string(number) + ": " + bad.what());
-    }
-  }
-}
-
 bool is_complete(Database& database) {
   return database.number("SELECT data FROM header WHERE key = 'complete'") == 1;
 }
@@ -49,13 +33,7 @@ void read_seen(Database& database, std::vector<FramePose>& frames) {
 
 std::vector<StoredMap> read_maps(Database& database, const StoreHeader& header) {
   const Transaction moment(database, false);  // one moment of a store that is being written
-  MapRows rows;
-  for (const char* table : MapRows::kTables) {
-    read_table(database, table, [&](std::int64_t robot, std::int64_t number, const Bytes& plain) {
-      rows.put(table, {robot, number}, plain, header.robots);
-    });
-  }
-  std::vector<StoredMap> maps = rows.maps();
+  std::vector<StoredMap> maps = MapRows::read(database, header.robots).maps();
   for (StoredMap& map : maps) {
     map.header = header;
     map.complete = is_complete(database);
@@ -228,7 +206,7 @@ core::Result<StoreContents> StoreReader::contents() const {
     StoreContents contents;
     contents.complete = is_complete(database);
 
-    read_table(database, "map", [&](std::int64_t, std::int64_t, const Bytes& plain) {
+    each_row(database, "map", [&](std::int64_t, std::int64_t, const Bytes& plain) {
       const auto row = maps::decode<MapRow>(plain);
       contents.keyframes += row.keyframes;
       contents.points += row.points;

@@ -2,10 +2,13 @@
 // Writes the rows of a store's copy.
 #include "plumbline/maps/store_replica.hpp"
 
+#include <exception>
+#include <optional>
 #include <system_error>
 #include <utility>
 
 #include "plumbline/maps/store.hpp"
+#include "store/map_rows.hpp"
 #include "store/store_row.hpp"
 
 namespace plumbline::maps {
@@ -50,10 +53,21 @@ struct StoreReplica::Impl {
   Impl(std::filesystem::path path, std::unique_ptr<Database> opened)
       : file(std::move(path)), database(std::move(opened)) {
     reread();
+    read_map();
+  }
+  /// Rows of a damaged file are an error only for those who need its map.
+  void read_map() {
+    map = {};
+    try {
+      map.robots = read_robots(*database);
+      map.rows = MapRows::read(*database, map.robots);
+    } catch (const std::exception& bad) {  // BadBytes, or SQLite's
+      map.damage = bad.what();
+    }
+    map.head = heads.map;
   }
   void reread() {
     heads = read_heads(*database);
-    robots = read_robots(*database);
     keyframes = static_cast<std::size_t>(database->number("SELECT count(*) FROM keyframe"));
     complete = database->number("SELECT data FROM header WHERE key = 'complete'") == 1;
   }
@@ -61,9 +75,12 @@ struct StoreReplica::Impl {
     open.reset();
     partial_row.clear();
     pending = {};
+    changes.clear();
+    robots = map.robots;
   }
   void apply_row(const StoreRow& row);
   void put(const RowTable& table, const StoreRow& row);
+  void apply_changes();
   void count(const RowTable& table, std::size_t size);
   /// Runs `action`; the transaction ends if it fails.
   template <typename Action>
@@ -76,16 +93,23 @@ struct StoreReplica::Impl {
   std::filesystem::path file;
   std::unique_ptr<Database> database;
   StoreHeads heads;
-  std::vector<RobotInfo> robots;
   std::size_t keyframes = 0;
   bool complete = false;
   ReplicaBytes bytes;
+  GrowingMap map;  ///< of what is committed
   // The open transaction:
   std::unique_ptr<Transaction> open;
   StoreStream stream = StoreStream::kMap;
   std::int64_t number = 0;
   Bytes partial_row;     ///< beginning of a row whose end has not been received
   ReplicaBytes pending;  ///< received so far
+  std::vector<RobotInfo> robots;
+  /// A row of the map that was written or, without content, removed.
+  struct Change {
+    RowName name;
+    std::optional<RowContent> content;
+  };
+  std::vector<Change> changes;
 };
 
 void StoreReplica::Impl::count(const RowTable& table, std::size_t size) {
@@ -129,9 +153,10 @@ void StoreReplica::Impl::apply_row(const StoreRow& row) {
     if (row.removed) {
       if (table.named) throw BadBytes("rows of this table stay");
       check_name(row.name);
+      changes.push_back({row.name, std::nullopt});
     } else {
       if (row.type != type_of(table, row.name.key)) throw BadBytes("its content has the wrong type");
-      check_row(row.name, row.data, robots);
+      changes.push_back({row.name, check_row(row.name, row.data, robots)});
     }
 
   } catch (const BadBytes& bad) {
@@ -161,6 +186,20 @@ void StoreReplica::Impl::apply_row(const StoreRow& row) {
       .run();
 }
 
+/// What was committed to the file, to the decoded map.
+void StoreReplica::Impl::apply_changes() {
+  map.robots = robots;
+  for (Change& change : changes) {
+    const MapRows::Key key{change.name.robot, change.name.number};
+    if (change.content) {
+      map.rows.put(key, std::move(*change.content));
+    } else {
+      map.rows.remove(kRowTables[change.name.table].name, key);
+    }
+  }
+  if (stream == StoreStream::kMap) map.head = number;
+}
+
 StoreReplica::StoreReplica(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 StoreReplica::StoreReplica(StoreReplica&& other) noexcept = default;
 StoreReplica& StoreReplica::operator=(StoreReplica&& other) noexcept = default;
@@ -180,6 +219,7 @@ core::Result<StoreReplica> StoreReplica::open(const std::filesystem::path& file)
 const StoreHeads& StoreReplica::heads() const { return impl_->heads; }
 std::size_t StoreReplica::keyframes() const { return impl_->keyframes; }
 bool StoreReplica::complete() const { return impl_->complete; }
+MapFollower StoreReplica::map() const { return MapFollower(impl_->map); }
 const ReplicaBytes& StoreReplica::bytes() const { return impl_->bytes; }
 void StoreReplica::roll_back() { impl_->roll_back(); }
 
@@ -210,6 +250,7 @@ core::Result<void> StoreReplica::commit() {
     if (impl_->open == nullptr) throw BadBytes("no transaction was begun");
     if (!impl_->partial_row.empty()) throw BadBytes("a row ends too early");
     impl_->open->commit();
+    impl_->apply_changes();
     const ReplicaBytes received = impl_->pending;
     impl_->roll_back();
     impl_->bytes.place += received.place;
@@ -229,6 +270,7 @@ core::Result<void> StoreReplica::clear() {
     impl_->database->run("DELETE FROM removed");
     whole.commit();
     impl_->reread();
+    impl_->read_map();
   });
 }
 

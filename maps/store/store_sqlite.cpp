@@ -82,4 +82,18 @@ Bytes Statement::unpacked(int column) const {
   return unpack(begin, static_cast<std::size_t>(value.getBytes()));
 }
 
+void each_row(Database& database, const std::string& table,
+              const std::function<void(std::int64_t, std::int64_t, const Bytes&)>& row) {
+  Statement rows(database, ("SELECT robot, number, data FROM " + table + " ORDER BY robot, number").c_str());
+  while (rows.step()) {
+    const std::int64_t robot = rows.integer(0);
+    const std::int64_t number = rows.integer(1);
+    try {
+      row(robot, number, rows.unpacked(2));
+    } catch (const BadBytes& bad) {
+      throw BadBytes(table + " " + std::to_string(robot) + "/" + std::to_string(number) + ": " + bad.what());
+    }
+  }
+}
+
 }  // namespace plumbline::maps

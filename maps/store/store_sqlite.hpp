@@ -7,6 +7,7 @@
 #include <sqlite3.h>
 
 #include <filesystem>
+#include <functional>
 #include <stdexcept>
 #include <string>
 
@@ -96,5 +97,10 @@ auto guarded(const std::filesystem::path& file, core::ErrorKind kind, const Acti
                                              "; use a copy of the file or map the recording again");
   }
 }
+
+/// Calls row(robot, number, unpacked bytes) for all rows of `table` by robot and number; what `row` dislikes
+/// is reported with the row's name.
+void each_row(Database& database, const std::string& table,
+              const std::function<void(std::int64_t, std::int64_t, const Bytes&)>& row);
 
 }  // namespace plumbline::maps

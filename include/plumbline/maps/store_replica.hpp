@@ -57,6 +57,28 @@ struct ReplicaBytes {
   std::uint64_t cloud = 0;  ///< clouds and their surfaces
 };
 
+struct GrowingMap;  // rows of a map, decoded
+
+/// The map of one robot as its store grows; each row is decoded once.
+class MapFollower {
+ public:
+  MapFollower();
+  MapFollower(MapFollower&& other) noexcept;
+  MapFollower& operator=(MapFollower&& other) noexcept;
+  ~MapFollower();
+  /// Applies the next transaction of the stream kMap. Errors (kInput): a store does not send such bytes.
+  core::Result<void> apply(const StoreTransaction& transaction);
+  [[nodiscard]] std::int64_t head() const;  ///< number of the last transaction applied
+  /// With the robots' cameras as header. Errors (kInput): rows that belong together are not all here yet, or
+  /// are of several robots whose maps are not one.
+  [[nodiscard]] core::Result<StoredMap> map() const;
+
+ private:
+  friend class StoreReplica;
+  explicit MapFollower(const GrowingMap& map);
+  std::unique_ptr<GrowingMap> map_;
+};
+
 /// The copy. Rows come from others and are checked before they are stored: known tables, keys in range, bytes
 /// that decode and unpack to no more than their kind can need, finite numbers. One writer; not thread-safe.
 class StoreReplica {
@@ -73,6 +95,9 @@ class StoreReplica {
   [[nodiscard]] const StoreHeads& heads() const;
   /// Number of keyframes in it.
   [[nodiscard]] std::size_t keyframes() const;
+  /// The map that it holds now, decoded as its rows came: a copy of its own, that shares its memory, so that
+  /// other threads may make maps of it. Rows in the file that cannot be decoded are an error of its map().
+  [[nodiscard]] MapFollower map() const;
   /// True if the run came to its end (StoredMap::complete); true only with the last transaction.
   [[nodiscard]] bool complete() const;
 
@@ -93,25 +118,6 @@ class StoreReplica {
  private:
   struct Impl;
   explicit StoreReplica(std::unique_ptr<Impl> impl);
-  std::unique_ptr<Impl> impl_;
-};
-
-/// The map of one robot as its store grows; each row is decoded once.
-class MapFollower {
- public:
-  MapFollower();
-  MapFollower(MapFollower&& other) noexcept;
-  MapFollower& operator=(MapFollower&& other) noexcept;
-  ~MapFollower();
-  /// Applies the next transaction of the stream kMap. Errors (kInput): a store does not send such bytes.
-  core::Result<void> apply(const StoreTransaction& transaction);
-  [[nodiscard]] std::int64_t head() const;  ///< number of the last transaction applied
-  /// With the robots' cameras as header. Errors (kInput): rows that belong together are not all here yet, or
-  /// are of several robots whose maps are not one.
-  [[nodiscard]] core::Result<StoredMap> map() const;
-
- private:
-  struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 

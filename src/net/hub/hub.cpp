@@ -15,7 +15,6 @@
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/core/side_thread.hpp"
 #include "plumbline/maps/output_folder.hpp"
-#include "plumbline/maps/stored_maps.hpp"
 
 namespace plumbline::net {
 namespace {
@@ -89,30 +88,27 @@ core::Result<void> add_network(const fs::path& file, const std::vector<RobotTraf
 }
 
 /// Folders of the maps that can be fused; `reason` names the others.
-std::vector<fs::path> usable_maps(const fs::path& folder, const std::vector<RobotTraffic>& traffic,
-                                  std::size_t expected, const core::Executor& executor, core::Log& log,
-                                  std::string& reason) {
+std::vector<fs::path> usable_maps(const fs::path& folder, const HubServer::Collected& collected,
+                                  std::size_t expected, core::Log& log, std::string& reason) {
   std::vector<fs::path> maps;
   const auto leave_out = [&](const std::string& why) { reason += (reason.empty() ? "" : "; ") + why; };
-  for (const RobotTraffic& t : traffic) {
-    const fs::path file = folder / "robots" / t.name / "map.db";
+  for (const RobotTraffic& t : collected.traffic) {
     if (!t.done) leave_out(fmt::format("{} has not sent everything", t.name));
     if (t.keyframes == 0) continue;
 
     // A damaged map must not keep the others from being fused.
-    const auto stored = maps::StoredMaps::open({file.parent_path()}, executor);
-    if (stored) {
-      maps.push_back(file.parent_path());
+    const auto damaged = collected.damaged.find(t.name);
+    if (damaged == collected.damaged.end()) {
+      maps.push_back(folder / "robots" / t.name);
       continue;
     }
 
-    const std::string why = stored.error().message;
-    log.warning(fmt::format("{} is left out: {}", t.name, why));
+    log.warning(fmt::format("{} is left out: {}", t.name, damaged->second));
     leave_out(t.name + " is left out: its map does not load");
   }
 
-  if (traffic.size() < expected) {
-    leave_out(fmt::format("{} of {} robots did not connect", expected - traffic.size(), expected));
+  if (const std::size_t came = collected.traffic.size(); came < expected) {
+    leave_out(fmt::format("{} of {} robots did not connect", expected - came, expected));
   }
 
   return maps;
@@ -131,12 +127,12 @@ core::Result<std::unique_ptr<HubBus>> open_logged_bus(const NetworkOptions& opti
 
 /// Fuses the received maps in `folder`; the summary's `reason` says why the result may not be trusted.
 core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, const fs::path& folder,
-                                                  const std::vector<RobotTraffic>& traffic,
+                                                  const HubServer::Collected& collected,
                                                   const HubMeetings& meetings, const core::Executor& executor,
                                                   core::Log& log, const pipeline::Progress& progress) {
   std::string reason;
   pipeline::FuseRequest last = request.fuse;
-  last.maps = usable_maps(folder, traffic, request.robots, executor, log, reason);
+  last.maps = usable_maps(folder, collected, request.robots, log, reason);
   if (last.maps.empty()) {
     return core::failure(
         core::ErrorKind::kUntrustworthy,
@@ -152,7 +148,8 @@ core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, con
   if (!summary->reason.empty()) reason = summary->reason + (reason.empty() ? "" : "; " + reason);
   summary->reason = reason;
   if (auto moved = move_all(last.output, folder); !moved) return tl::unexpected(moved.error());
-  if (auto added = add_network(folder / "summary.json", traffic, meetings.meetings(), reason); !added) {
+  if (auto added = add_network(folder / "summary.json", collected.traffic, meetings.meetings(), reason);
+      !added) {
     return tl::unexpected(added.error());
   }
   return summary;
@@ -190,8 +187,7 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
   const core::SideThread farewell([&](const core::StopToken& enough) {
     (*server)->publisher().publish_final(collected.final_statuses, enough);
   });
-  auto summary =
-      fuse_collected(request, folder, collected.traffic, (*server)->meetings(), executor, log, progress);
+  auto summary = fuse_collected(request, folder, collected, (*server)->meetings(), executor, log, progress);
   if (!summary) return summary;
   if (auto committed = output->commit(); !committed) return tl::unexpected(committed.error());
   return summary;

@@ -4,16 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 #include <system_error>
 #include <utility>
 
-#include "plumbline/core/packing.hpp"
-
 namespace plumbline::net {
 namespace {
-
-constexpr std::size_t kEntryHead = sizeof(std::uint32_t);  // bytes of the length in front of an entry
 
 void put_pose(const geometry::Rigid3& pose, std::array<double, 7>& to) {
   const Eigen::Quaterniond q = pose.quaternion();
@@ -41,11 +36,10 @@ geometry::Rigid3 pose_of(const SharedFrame& frame) {
 }
 
 HubMeetings::HubMeetings(std::filesystem::path folder, const core::Executor& executor, core::Log& log)
-    : folder_(std::move(folder)), executor_(&executor), log_(&log), reported_(folder_, log) {
+    : executor_(&executor), log_(&log), reported_(folder, log) {
   std::error_code ignored;
-  std::filesystem::remove_all(folder_ / "meetings", ignored);
+  std::filesystem::remove_all(folder / "meetings", ignored);
   begin();
-  job_ = executor_->submit([this] { replay(); });
 }
 
 void HubMeetings::begin() {
@@ -60,80 +54,19 @@ void HubMeetings::restart() {
   job_.wait();
   for (const auto& [robot, known] : robots_) changed_.insert(robot);
   begin();
-  std::error_code ignored;
-  std::filesystem::remove(log_file(), ignored);
 }
 
-/// In the job. An entry that is incomplete in the log was not applied.
-void HubMeetings::replay() {
-  std::uintmax_t whole = 0;
-  {
-    std::ifstream file(log_file(), std::ios::binary);
-    core::Bytes bytes(kEntryHead);
-
-    while (file.read(reinterpret_cast<char*>(bytes.data()), kEntryHead)) {
-      core::Bytes packed(core::decode<std::uint32_t>(bytes));
-      if (!file.read(reinterpret_cast<char*>(packed.data()), static_cast<std::streamsize>(packed.size())))
-        break;
-      try {
-        apply(core::decode<Entry>(core::unpack(packed.data(), packed.size())));
-      } catch (const core::BadBytes&) {
-        break;
-      }
-      whole += kEntryHead + packed.size();
-    }
-  }
-
-  std::error_code ignored;
-  if (std::filesystem::exists(log_file(), ignored)) std::filesystem::resize_file(log_file(), whole, ignored);
-}
-
-/// In the job: makes an entry of the new rows in one robot's copy.
-void HubMeetings::read_new_rows(const std::string& robot) {
-  const std::filesystem::path copy = folder_ / "robots" / robot / "map.db";
-  Entry entry{robot, {}};
-  std::int64_t head = robots_[robot].follower.head();
-  while (true) {
-    auto next = maps::next_transaction(copy, maps::StoreStream::kMap, head);
-    if (!next || !*next) break;
-    head = (*next)->number;
-    entry.rows.push_back(std::move(**next));
-  }
-  if (entry.rows.empty()) return;
-  if (const auto appended = append_to_log(entry); !appended) work_.lines.push_back(appended.error().message);
-  apply(entry);
-}
-
-/// Called before the entry is applied, so that reports follow from the log.
-core::Result<void> HubMeetings::append_to_log(const Entry& entry) const {
-  const core::Bytes packed = core::pack(core::encoded(entry));
-  const core::Bytes head = core::encoded(static_cast<std::uint32_t>(packed.size()));
-  std::ofstream file(log_file(), std::ios::binary | std::ios::app);
-  for (const core::Bytes* part : {&head, &packed}) {
-    file.write(reinterpret_cast<const char*>(part->data()), static_cast<std::streamsize>(part->size()));
-  }
-  file.flush();
-  if (file) return {};
-  return core::output_error(log_file().string() +
-                            ": cannot be written; a hub that is resumed may report other meetings");
-}
-
-/// In the job: applies an entry of the log.
-void HubMeetings::apply(const Entry& entry) {
-  Robot& known = robots_[entry.robot];
-  const std::string head = fmt::format("log {}: {}", ++work_.entry, entry.robot);
-  for (const maps::StoreTransaction& rows : entry.rows) {
-    if (const auto applied = known.follower.apply(rows); !applied)
-      work_.lines.push_back(head + ": " + applied.error().message);
-  }
-  const auto stored = known.follower.map();
+/// In the job: looks up the keyframes that are new in one robot's map.
+void HubMeetings::search(const std::string& robot, const maps::MapFollower& copy) {
+  const std::string head = fmt::format("search {}: {}", ++work_.searches, robot);
+  const auto stored = copy.map();
   if (!stored) {  // rows that belong together are incomplete; more will come
     work_.lines.push_back(head + " waits for more of its rows");
     return;
   }
-  const int added = add(entry.robot, *stored);
-  work_.lines.push_back(
-      fmt::format("{} up to transaction {}, {} new keyframes", head, known.follower.head(), added));
+
+  const int added = add(robot, *stored);
+  work_.lines.push_back(fmt::format("{} up to transaction {}, {} new keyframes", head, copy.head(), added));
   for (mapping::MeetingEvent& event : server_->finish()) work_.events.push_back(std::move(event));
 }
 
@@ -155,7 +88,7 @@ int HubMeetings::add(const std::string& robot, const maps::StoredMap& stored) {
   int added = 0;
   for (const core::KeyframeId id : ids) {
     if (id.index < known.keyframes) continue;
-    server_->add(map, {number, id.index}, work_.entry);
+    server_->add(map, {number, id.index}, work_.searches);
     known.keyframes = id.index + 1;
     ++added;
   }
@@ -163,15 +96,22 @@ int HubMeetings::add(const std::string& robot, const maps::StoredMap& stored) {
   return added;
 }
 
-bool HubMeetings::step() {
+bool HubMeetings::step(const std::map<std::string, RobotSession>& robots) {
   if (job_.valid()) {
     if (!job_.ready()) return false;
     report();
     return true;
   }
-  if (changed_.empty()) return false;
-  job_ = executor_->submit([this, changed = std::exchange(changed_, {})] {
-    for (const std::string& robot : changed) read_new_rows(robot);
+
+  std::vector<std::pair<std::string, maps::MapFollower>> copies;
+  for (const std::string& name : std::exchange(changed_, {})) {
+    const auto session = robots.find(name);
+    if (session != robots.end()) copies.emplace_back(name, session->second.copy().map());
+  }
+  if (copies.empty()) return false;
+
+  job_ = executor_->submit([this, copies = std::make_shared<decltype(copies)>(std::move(copies))] {
+    for (const auto& [robot, copy] : *copies) search(robot, copy);
   });
   return false;
 }
@@ -180,7 +120,7 @@ void HubMeetings::report() {
   job_.wait();
   for (const std::string& line : std::exchange(work_.lines, {})) log_->debug(line);
   for (const mapping::MeetingEvent& event : std::exchange(work_.events, {})) {
-    const auto noted = reported_.note(event, names_, fmt::format("(log {})", event.frame), -1.0);
+    const auto noted = reported_.note(event, names_, fmt::format("(search {})", event.frame), -1.0);
     if (!noted) log_->warning(noted.error().message);
   }
   frames_.clear();
@@ -191,14 +131,12 @@ void HubMeetings::report() {
   }
 }
 
-void HubMeetings::finish() {
+void HubMeetings::finish(const std::map<std::string, RobotSession>& robots) {
   do {
-    step();
+    step(robots);
     if (job_.valid()) report();
   } while (!changed_.empty());
   if (const auto drawn = reported_.draw(); !drawn) log_->warning(drawn.error().message);
-  std::error_code ignored;
-  std::filesystem::remove(log_file(), ignored);
 }
 
 SharedFrame HubMeetings::frame(const std::string& robot) const {

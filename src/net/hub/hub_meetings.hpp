@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Finds robots that meet while they map, from the copies of their stores. The work is a job beside the hub's
-// thread: a commit never waits for it. Entries are numbered and kept in a log beside the copies, from which
-// alone the previews follow, also in a hub that is resumed.
+// Finds robots that meet while they map, from the copies of their maps. The work is a job beside the hub's
+// thread: a commit never waits for it. A hub that is resumed searches the copies again.
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -13,8 +12,8 @@
 #include <vector>
 
 #include "bus.hpp"
+#include "hub/robot_session.hpp"
 #include "plumbline/mapping/merging/merge_server.hpp"
-#include "plumbline/maps/store_replica.hpp"
 #include "plumbline/pipeline/meeting_log.hpp"
 
 namespace plumbline::net {
@@ -24,46 +23,32 @@ geometry::Rigid3 pose_of(const SharedFrame& frame);
 
 class HubMeetings {
  public:
-  /// Applies what an earlier process left in the log, in the same order.
+  /// `folder`: of the result; meetings that an earlier process left there are removed.
   HubMeetings(std::filesystem::path folder, const core::Executor& executor, core::Log& log);
 
-  /// The copy of a robot's store, below the folder, has new rows of its map.
+  /// The copy of a robot's store has new rows of its map.
   void mark_changed(const std::string& robot) { changed_.insert(robot); }
   /// A copy was emptied: starts again with all of them.
   void restart();
   /// Reports what a job found and submits the next one; to be called often. True: shared frames have changed.
-  bool step();
-  /// Called at the end: reports all remaining meetings, draws, and removes the log.
-  void finish();
+  bool step(const std::map<std::string, RobotSession>& robots);
+  /// Called at the end: reports all remaining meetings, and draws.
+  void finish(const std::map<std::string, RobotSession>& robots);
   /// Pose of a robot in the frame that it shares with others; empty: it has met no other robot.
   [[nodiscard]] SharedFrame frame(const std::string& robot) const;
   [[nodiscard]] const std::vector<pipeline::Meeting>& meetings() const { return reported_.meetings(); }
 
  private:
-  /// A robot with at least one entry.
+  /// A robot that was searched.
   struct Robot {
-    maps::MapFollower follower;
     std::optional<std::size_t> number;  ///< in the merge server; none: it has no keyframes yet
     std::int32_t keyframes = 0;         ///< number of those added
   };
-  struct Entry {
-    std::string robot;
-    std::vector<maps::StoreTransaction> rows;
-    template <typename Io>
-    friend void fields(Io& io, Entry& entry) {
-      io(entry.robot, entry.rows);
-    }
-  };
-  [[nodiscard]] std::filesystem::path log_file() const { return folder_ / "meetings.log"; }
   void begin();
-  void replay();
-  void read_new_rows(const std::string& robot);
-  core::Result<void> append_to_log(const Entry& entry) const;
-  void apply(const Entry& entry);
+  void search(const std::string& robot, const maps::MapFollower& copy);
   int add(const std::string& robot, const maps::StoredMap& stored);
   void report();
 
-  std::filesystem::path folder_;
   const core::Executor* executor_;
   core::Log* log_;
   pipeline::MeetingLog reported_;
@@ -74,7 +59,7 @@ class HubMeetings {
   std::map<std::string, SharedFrame> frames_;
   /// Results of a job, for report().
   struct Work {
-    std::int64_t entry = 0;  ///< number of the last one
+    std::int64_t searches = 0;  ///< number of the last one
     std::vector<std::string> lines;
     std::vector<mapping::MeetingEvent> events;
   } work_;

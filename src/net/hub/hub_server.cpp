@@ -79,9 +79,12 @@ core::Result<RobotSession*> HubServer::open_session(const RobotStatus& known) {
 
 core::Result<void> HubServer::look_for_others(const core::StopToken& stop) {
   const auto until = Clock::now() + kLookForOthers;
+  std::vector<ReceivedStatus> early;  // received meanwhile: unread ones would end each wait at once
+
   while (Clock::now() < until && !stop.stop_requested()) {
     publisher_.publish_presence();
     bus_->wait(kWait);
+    for (ReceivedStatus& received : bus_->poll_robots()) early.push_back(std::move(received));
     for (const HubStatus& other : bus_->poll_hubs()) {
       // If two hubs start together, the one with the lower id stays.
       const bool stays = other.up_s >= 0.0 || other.hub < publisher_.id();
@@ -92,7 +95,9 @@ core::Result<void> HubServer::look_for_others(const core::StopToken& stop) {
           request_.network.domain));
     }
   }
+
   publisher_.serve();
+  for (const ReceivedStatus& received : early) receive_status(received);
   return {};
 }
 
@@ -293,7 +298,7 @@ void HubServer::serve(const core::StopToken& stop, const Status& status) {
   while (!stop.stop_requested()) {
     bus_->wait(kWait);
     poll();
-    if (meetings_.step()) {
+    if (meetings_.step(robots_)) {
       for (auto& [name, session] : robots_) {
         session.changed = true;
         const SharedFrame frame = meetings_.frame(name);
@@ -313,7 +318,7 @@ void HubServer::serve(const core::StopToken& stop, const Status& status) {
     }
     if (request_.robots > 0 && done() >= request_.robots) break;
   }
-  meetings_.finish();
+  meetings_.finish(robots_);
 }
 
 HubServer::Collected HubServer::close() {
@@ -321,6 +326,7 @@ HubServer::Collected HubServer::close() {
   Collected collected;
   for (const auto& [name, session] : robots_) {
     collected.traffic.push_back(session.traffic());
+    if (const auto map = session.copy().map().map(); !map) collected.damaged[name] = map.error().message;
     if (session.done) collected.final_statuses.push_back(status_of(session));
   }
   robots_.clear();

@@ -35,11 +35,14 @@ void HubShow::step(const std::map<std::string, RobotSession>& robots, const HubM
     names.push_back(name);
     const std::int64_t head = session.copy().heads().last();
     if (session.copy().keyframes() == 0 || std::exchange(shown_heads_[name], head) == head) continue;
-    tasks.push_back({number, name, session.file(), meetings.frame(name)});
+    tasks.push_back({number, name, session.file(), session.copy().map(), meetings.frame(name)});
   }
 
   if (tasks.empty()) return;
-  job_ = executor_.submit([this, names = std::move(names), tasks = std::move(tasks)] { show(names, tasks); });
+  job_ = executor_.submit(
+      [this, names = std::move(names), tasks = std::make_shared<decltype(tasks)>(std::move(tasks))] {
+        show(names, *tasks);
+      });
 }
 
 void HubShow::show(const std::vector<std::string>& names, const std::vector<Task>& tasks) {
@@ -51,10 +54,7 @@ void HubShow::show(const std::vector<std::string>& names, const std::vector<Task
 }
 
 core::Result<void> HubShow::show_robot(const Task& task) {
-  const auto store = maps::StoreReader::open(task.file);
-  if (!store) return tl::unexpected(store.error());
-
-  const auto stored = store->load();
+  const auto stored = task.copy.map();
   if (!stored) return tl::unexpected(stored.error());
   const geometry::Trajectory path = maps::keyframe_trajectory(stored->map);
   if (path.empty()) return {};
@@ -64,6 +64,8 @@ core::Result<void> HubShow::show_robot(const Task& task) {
                      path.back().world_from_camera);
   observer_->keyframes(task.number, path);
 
+  const auto store = maps::StoreReader::open(task.file);
+  if (!store) return tl::unexpected(store.error());
   const auto clouds = store->cloud_ids();
   if (!clouds) return tl::unexpected(clouds.error());
 

@@ -38,7 +38,8 @@ class HubShow {
   struct Task {
     std::int32_t number = 0;
     std::string name;
-    std::filesystem::path file;
+    std::filesystem::path file;  ///< of the copy
+    maps::MapFollower copy;      ///< its map
     SharedFrame frame;
   };
   void show(const std::vector<std::string>& names, const std::vector<Task>& tasks);

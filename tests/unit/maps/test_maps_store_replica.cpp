@@ -99,6 +99,7 @@ TEST(StoreReplica, HoldsTheSameRowsWheneverItCaughtUp) {
   const auto stored = load_map(copied);
   ASSERT_TRUE(stored) << stored.error().message;
   EXPECT_TRUE(equal(stored->map, world.map));
+  EXPECT_TRUE(equal(copy->map().map()->map, world.map)) << "what it decoded as the rows came";
   EXPECT_GT(copy->bytes().place, 0U);
   EXPECT_GT(copy->bytes().map, 0U);
   EXPECT_GT(copy->bytes().cloud, 0U);
@@ -176,16 +177,22 @@ TEST(StoreReplica, GoesOnWhereItWasCommitted) {
     ASSERT_TRUE(second && *second);
     ASSERT_TRUE(copy->begin(StoreStream::kMap, (*second)->number));
     ASSERT_TRUE(copy->append((*second)->rows.data(), (*second)->rows.size() / 2));
+    const std::size_t keyframes = copy->map().map()->map.keyframe_count();
     EXPECT_EQ(copy->commit().error().kind, core::ErrorKind::kInput) << "half a row";
+    EXPECT_EQ(copy->map().map()->map.keyframe_count(), keyframes) << "nothing of half a transaction";
   }
   auto copy = StoreReplica::open(copied);
   ASSERT_TRUE(copy);
+  EXPECT_TRUE(equal(copy->map().map()->map, load_map(copied)->map)) << "rows that were there before";
   EXPECT_EQ(copy->heads().map, before.map);
   EXPECT_EQ(copy->begin(StoreStream::kMap, before.map).error().kind, core::ErrorKind::kInput);
   follow(folder.file(), *copy);
   EXPECT_EQ(dump(copied), dump(folder.file()));
+  const MapFollower before_it_is_emptied = copy->map();
   ASSERT_TRUE(copy->clear());
   EXPECT_EQ(copy->heads().last(), 0);
+  EXPECT_EQ(copy->map().map()->map.keyframe_count(), 0U);
+  EXPECT_TRUE(equal(before_it_is_emptied.map()->map, world.map)) << "a map that was taken stays";
   follow(folder.file(), *copy);
   EXPECT_EQ(dump(copied), dump(folder.file()));
 }
