@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "plumbline/cloud/compact/compact_cloud.hpp"
 #include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
 #include "plumbline/cloud/transform.hpp"
@@ -14,24 +15,76 @@
 
 namespace plumbline::maps {
 
+namespace {
+
+std::int32_t number_in(const RobotNumbers& numbers, std::int32_t stored) {
+  const auto found = numbers.find(stored);
+  return found == numbers.end() ? stored : found->second;
+}
+
+std::int32_t stored_number(const RobotNumbers& numbers, std::int32_t robot) {
+  const auto found = std::find_if(numbers.begin(), numbers.end(),
+                                  [&](const auto& number) { return number.second == robot; });
+  return found == numbers.end() ? robot : found->first;
+}
+
+}  // namespace
+
+core::KeyframeId StoredViews::stored_keyframe(std::size_t view) const {
+  return {stored_number(numbers, keyframes[view].robot), keyframes[view].index};
+}
+
+FrameId StoredViews::stored_frame(std::size_t view) const {
+  return {stored_number(numbers, frames[view].robot), frames[view].index};
+}
+
 core::Result<cloud::CloudPtr> StoredViews::read(std::size_t view) const {
-  const bool of_keyframe = keyframes[view].valid();
-  auto cloud = of_keyframe ? reader->cloud(keyframes[view]) : reader->cloud(frames[view]);
-  if (!cloud) return cloud;
-  if (of_keyframe) {
-    cameras.apply(keyframes[view], velocities[view], **cloud);
-  } else {
-    cameras.apply(frames[view], velocities[view], **cloud);
+  if (keyframes[view].valid()) {
+    const core::KeyframeId id = stored_keyframe(view);
+    auto cloud = reader->cloud(id);
+    if (cloud) cameras.apply(id, velocities[view], **cloud);
+    return cloud;
   }
+
+  const FrameId frame = stored_frame(view);
+  auto cloud = reader->cloud(frame);
+  if (cloud) cameras.apply(frame, velocities[view], **cloud);
   return cloud;
 }
 
+core::Result<std::vector<std::uint8_t>> StoredViews::bytes(std::size_t view) const {
+  const bool of_keyframe = keyframes[view].valid();
+  const bool changes =
+      of_keyframe ? cameras.changes(stored_keyframe(view)) : cameras.changes(stored_frame(view));
+  if (!changes) {
+    return of_keyframe ? reader->cloud_bytes(stored_keyframe(view)) : reader->cloud_bytes(stored_frame(view));
+  }
+  const auto cloud = read(view);
+  if (!cloud) return tl::unexpected(cloud.error());
+  return cloud::encode_cloud(**cloud);
+}
+
+core::Result<std::optional<StoredSurface>> StoredViews::surface(std::size_t view) const {
+  if (!keyframes[view].valid()) return std::nullopt;
+  const core::KeyframeId id = stored_keyframe(view);
+  const auto bytes = reader->surface_bytes(id);
+  if (!bytes) return tl::unexpected(bytes.error());
+  if (bytes->empty()) return std::nullopt;
+  auto surface = unpack_surface(*bytes);
+  if (!surface) return tl::unexpected(surface.error());
+  cameras.apply(id, velocities[view], surface->samples);
+  return std::optional(std::move(*surface));
+}
+
 core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& map,
-                                   const std::vector<RobotInfo>& robots, const Arrivals& arrivals) {
-  const auto keyframes = reader.cloud_ids();
+                                   const std::vector<RobotInfo>& robots, const Arrivals& arrivals,
+                                   const RobotNumbers& numbers) {
+  auto keyframes = reader.cloud_ids();
   if (!keyframes) return tl::unexpected(keyframes.error());
   auto frames = reader.frame_cloud_ids();
   if (!frames) return tl::unexpected(frames.error());
+  for (core::KeyframeId& id : *keyframes) id.robot = number_in(numbers, id.robot);
+  for (FrameId& frame : *frames) frame.robot = number_in(numbers, frame.robot);
 
   const auto arrival = [&](FrameId frame) {
     const auto found = arrivals.find(frame);
@@ -43,6 +96,7 @@ core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& ma
   StoredViews views;
   views.reader = &reader;
   views.cameras = CameraHistory(robots);
+  views.numbers = numbers;
 
   const std::map<std::int32_t, geometry::Trajectory> paths = by_robot(map);
 

@@ -12,7 +12,7 @@
 #include "plumbline/maps/output_folder.hpp"
 #include "plumbline/maps/result_folder.hpp"
 #include "plumbline/maps/stored_maps.hpp"
-#include "plumbline/maps/stored_result.hpp"
+#include "plumbline/maps/stored_run.hpp"
 #include "report_cloud.hpp"
 
 namespace plumbline::report {
@@ -56,7 +56,7 @@ void add_paths(ReportData& data) {
 }
 
 /// Pairs of keyframes that loops, and merges of several robots' maps, tie together.
-void add_loops(const maps::StoredResult& stored, ReportData& data) {
+void add_loops(const maps::StoredRun& stored, ReportData& data) {
   std::map<core::KeyframeId, Eigen::Vector3d> places;
   for (const maps::KeyframePose& k : stored.keyframes()) places[k.id] = k.world_from_camera.translation;
   for (const maps::LoopEdge& loop : stored.stored().map.loops()) {
@@ -78,7 +78,7 @@ void add_store(ReportData& data) {
     return;
   }
 
-  const auto stored = maps::StoredResult::open(file);
+  const auto stored = maps::StoredRun::open_main(file);
   if (!stored) {
     data.missing.emplace_back("map.db is damaged: loops are not drawn");
     return;

@@ -2,41 +2,29 @@
 #pragma once
 
 // Finished maps as the source of a run: their clouds come one after another.
-#include <cstdint>
+#include <cstddef>
 #include <filesystem>
-#include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "plumbline/core/executor.hpp"
-#include "plumbline/maps/camera_history.hpp"
-#include "plumbline/maps/store.hpp"
+#include "plumbline/maps/stored_run.hpp"
 
 namespace plumbline::maps {
 
 /// One store. Its robots are renumbered so that no two stores have the same number.
 struct StoredPart {
   std::string name;  ///< of its folder
-  std::filesystem::path file;
-  std::unique_ptr<StoreReader> reader;
-  Map map;
-  std::vector<FramePose> frames;
-  std::vector<RobotInfo> robots;  ///< their clouds are given as the latest version of their camera has them
-  CameraHistory cameras;          ///< by the store's numbers
-  /// Paths of the robots in the part's map, by this run's numbers.
-  std::map<std::int32_t, geometry::Trajectory> paths;
-  std::map<std::int32_t, std::int32_t> numbers;  ///< of robots: from the store's to this run's
+  StoredRun run;
+  std::vector<RobotInfo> robots;  ///< by this run's numbers; clouds are as the latest camera has them
+  StoredViews views = {};         ///< its clouds
 };
 
 /// A cloud that waits in a store.
 struct StoredCloud {
   std::size_t part = 0;
-  std::int32_t stored_robot = 0;  ///< as its store numbers the robot; the rest is as this run does
-  core::KeyframeId id;            ///< invalid: of a frame between keyframes
-  FrameId frame;                  ///< of such a frame
-  double stamp = 0.0;
+  std::size_t view = 0;  ///< of the part's views
 };
 
 /// Parts stand in an order that their contents decide: the one with most keyframes first. Robots are numbered
@@ -50,11 +38,9 @@ class StoredMaps {
 
   [[nodiscard]] const std::vector<StoredPart>& parts() const { return parts_; }
   [[nodiscard]] const std::vector<StoredCloud>& clouds() const { return clouds_; }
-  /// May be called from several threads at a time.
-  [[nodiscard]] core::Result<std::vector<std::uint8_t>> cloud_bytes(std::size_t index) const;
-  /// The coarse surface of a keyframe's cloud; none: none was kept. May be called from several threads at a
-  /// time.
-  [[nodiscard]] core::Result<std::optional<StoredSurface>> surface(std::size_t index) const;
+  [[nodiscard]] const StoredViews& views_of(const StoredCloud& cloud) const {
+    return parts_[cloud.part].views;
+  }
   /// Robots of all parts, by this run's numbers.
   [[nodiscard]] const std::vector<RobotInfo>& robots() const { return robots_; }
   /// Error about a cloud that cannot be used.
@@ -66,8 +52,6 @@ class StoredMaps {
   StoredMaps() = default;
   static core::Result<StoredPart> read_part(const std::filesystem::path& map);
   core::Result<void> arrange(const core::Executor& executor);
-  core::Result<void> list_clouds(std::size_t part);
-  [[nodiscard]] geometry::Vector6d velocity_of(const StoredCloud& cloud) const;
 
   std::vector<StoredPart> parts_;
   std::vector<RobotInfo> robots_;

@@ -11,7 +11,7 @@
 #include "plumbline/core/options.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/exports/export.hpp"
-#include "plumbline/maps/stored_result.hpp"
+#include "plumbline/maps/stored_run.hpp"
 #include "plumbline/pipeline/graph.hpp"
 #include "plumbline/pipeline/reference.hpp"
 #include "reference/completion.hpp"

@@ -8,7 +8,7 @@
 #include "app.hpp"
 #include "option_flags.hpp"
 #include "plumbline/exports/export.hpp"
-#include "plumbline/maps/stored_result.hpp"
+#include "plumbline/maps/stored_run.hpp"
 #include "recording_opener.hpp"
 #include "terminal/silenced_stdio.hpp"
 
@@ -43,7 +43,7 @@ core::Result<void> export_keyframes(const ExportCommand& command) {
         command.request.input.string()));
   }
   place->robot = command.request.robot;
-  const auto stored = maps::StoredResult::open(*place);
+  const auto stored = maps::StoredRun::open_main(*place);
   if (!stored) return tl::unexpected<core::Error>(stored.error());
   const auto count = stored->write_keyframe_clouds(command.keyframes);
   if (!count) return tl::unexpected<core::Error>(count.error());

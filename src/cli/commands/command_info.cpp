@@ -20,7 +20,7 @@
 #include "plumbline/dataset/recording_poses.hpp"
 #include "plumbline/dataset/summary.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
-#include "plumbline/maps/stored_result.hpp"
+#include "plumbline/maps/stored_run.hpp"
 #include "plumbline/net/ros2.hpp"
 #include "plumbline/pipeline/input.hpp"
 #include "plumbline/synth/source.hpp"

@@ -16,7 +16,7 @@
 #include "plumbline/cloud/io/ply.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/maps/output_folder.hpp"
-#include "plumbline/maps/stored_result.hpp"
+#include "plumbline/maps/stored_run.hpp"
 #include "plumbline/viz/snapshot.hpp"
 #include "plumbline/viz/turntable.hpp"
 #include "video.hpp"
@@ -83,7 +83,7 @@ core::Result<void> add_paths(const maps::MapPlace& place, bool lines, viz::Scene
   }
 
   if (!place.result || (lines && !has_lines)) {
-    const auto stored = maps::StoredResult::open(place);
+    const auto stored = maps::StoredRun::open_main(place);
     if (!stored) return tl::unexpected<core::Error>(stored.error());
     if (!place.result) scene.paths.emplace_back().trajectory = stored->trajectory();
     if (lines) segments = stored->lines();

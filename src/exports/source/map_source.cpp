@@ -149,7 +149,7 @@ core::Result<void> MapSource::open_map() {
   place_.robot = request_->robot;
   upright_ = place_.result.has_value();
   if (place_.store.empty()) return {};
-  auto stored = maps::StoredResult::open(place_);
+  auto stored = maps::StoredRun::open_main(place_);
   if (!stored) return tl::unexpected(stored.error());
   store_.emplace(std::move(*stored));
   const maps::StoredMap& map = store_->stored();
@@ -241,7 +241,7 @@ std::string MapSource::name() const {
   return name.empty() || name == "." ? fs::absolute(input).parent_path().filename().string() : name;
 }
 
-core::Result<const maps::StoredResult*> MapSource::store(const std::string& what) const {
+core::Result<const maps::StoredRun*> MapSource::store(const std::string& what) const {
   if (store_) return &*store_;
   if (is_component(place_)) {
     return core::input_error(

@@ -10,7 +10,7 @@
 
 #include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/exports/export.hpp"
-#include "plumbline/maps/stored_result.hpp"
+#include "plumbline/maps/stored_run.hpp"
 #include "plumbline/maps/stored_views.hpp"
 
 namespace plumbline::exports {
@@ -42,7 +42,7 @@ class MapSource {
 
   /// The map's store, for data that only it holds; `what`: "free space" and the like, for the message. Errors
   /// (kInput): there is none, with advice.
-  [[nodiscard]] core::Result<const maps::StoredResult*> store(const std::string& what) const;
+  [[nodiscard]] core::Result<const maps::StoredRun*> store(const std::string& what) const;
   [[nodiscard]] bool has_store() const { return store_.has_value(); }
   [[nodiscard]] const maps::MapPlace& place() const { return place_; }
   /// From the map's own frame into that of everything that is exported.
@@ -82,7 +82,7 @@ class MapSource {
   const ExportProgress* progress_ = nullptr;
   bool cloud_only_ = false;  ///< the input is a cloud
   maps::MapPlace place_;
-  std::optional<maps::StoredResult> store_;
+  std::optional<maps::StoredRun> store_;
   std::vector<maps::RobotInfo> robots_;
   geometry::Rigid3 world_from_map_;
   bool upright_ = false;

@@ -130,7 +130,7 @@ core::Result<Pictures> Pictures::open(const MapSource& source) {
   return stored;
 }
 
-Pictures Pictures::open_stored(const maps::StoredResult& store) {
+Pictures Pictures::open_stored(const maps::StoredRun& store) {
   Pictures pictures;
   const auto ids = store.reader().whole_picture_ids();
   if (!ids) return pictures;

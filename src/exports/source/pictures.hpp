@@ -30,7 +30,7 @@ class Pictures {
 
  private:
   static core::Result<Pictures> open_recordings(const MapSource& source);
-  static Pictures open_stored(const maps::StoredResult& store);
+  static Pictures open_stored(const maps::StoredRun& store);
 
   struct Recording {
     std::unique_ptr<dataset::FrameSource> given;

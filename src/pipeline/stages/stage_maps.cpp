@@ -25,16 +25,16 @@ class MapsStage : public Stage {
   /// Surfaces are needed at once; clouds stay in the store until they are fused.
   core::Result<void> process(StageIo& io) override {
     const maps::StoredCloud& stored = maps_->clouds()[io.frame()];
+    const maps::StoredViews& views = maps_->views_of(stored);
     auto result = std::make_shared<KeyframeCloud>();
-    result->id = stored.id;
-    result->frame = stored.frame;
-    result->stamp = stored.stamp;
-    result->stored = [maps = maps_, index = io.frame()] { return maps->cloud_bytes(index); };
-    if (stored.id.valid()) {
-      if (auto read = read_surface(io.frame(), *result); !read) {
-        return tl::unexpected(maps_->damaged(stored.id, {}, read.error()));
-      }
-    }
+    result->id = views.keyframes[stored.view];
+    result->frame = views.frames[stored.view];
+    result->stamp = views.stamps[stored.view];
+    result->stored = [&views, view = stored.view] { return views.bytes(view); };
+
+    auto surface = views.surface(stored.view);
+    if (!surface) return tl::unexpected(maps_->damaged(result->id, {}, surface.error()));
+    if (*surface) result->surface = std::make_shared<maps::StoredSurface>(std::move(**surface));
     io.output<KeyframeCloud>("cloud", result);
     return {};
   }
@@ -42,7 +42,8 @@ class MapsStage : public Stage {
   core::Result<void> finish(StageIo& io) override {
     auto result = std::make_shared<RobotMaps>();
     for (const maps::StoredPart& part : maps_->parts()) {
-      const RobotMap whole{part.name, part.robots, std::make_shared<maps::Map>(part.map), part.frames};
+      const maps::StoredMap& stored = part.run.stored();
+      const RobotMap whole{part.name, part.robots, std::make_shared<maps::Map>(stored.map), stored.frames};
       for (RobotMap& component : components_of(whole).maps) result->maps.push_back(std::move(component));
     }
     io.output<RobotMaps>("maps", result);
@@ -50,14 +51,6 @@ class MapsStage : public Stage {
   }
 
  private:
-  /// Reads the surface that was kept with the map, if any.
-  core::Result<void> read_surface(std::size_t index, KeyframeCloud& result) const {
-    auto surface = maps_->surface(index);
-    if (!surface) return tl::unexpected(surface.error());
-    if (*surface) result.surface = std::make_shared<maps::StoredSurface>(std::move(**surface));
-    return {};
-  }
-
   const maps::StoredMaps* maps_ = nullptr;
 };
 

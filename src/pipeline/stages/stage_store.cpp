@@ -159,12 +159,13 @@ class StoreStage : public Stage {
     std::vector<maps::StorePicture> pictures;
     if (images_ == Images::kOff) return pictures;
     for (const maps::StoredCloud& cloud : context_->input.stored_maps->clouds()) {
-      if (!cloud.id.valid()) continue;
-      const maps::StoreReader& reader = *context_->input.stored_maps->parts()[cloud.part].reader;
-      const core::KeyframeId stored{cloud.stored_robot, cloud.id.index};
-      const auto small = reader.small_picture(stored);
-      const auto whole = reader.whole_picture(stored);
-      if (small && whole && !small->empty()) pictures.push_back({cloud.id, *small, *whole});
+      const maps::StoredViews& views = context_->input.stored_maps->views_of(cloud);
+      const core::KeyframeId id = views.keyframes[cloud.view];
+      if (!id.valid()) continue;
+      const core::KeyframeId stored = views.stored_keyframe(cloud.view);
+      const auto small = views.reader->small_picture(stored);
+      const auto whole = views.reader->whole_picture(stored);
+      if (small && whole && !small->empty()) pictures.push_back({id, *small, *whole});
     }
     return pictures;
   }

@@ -7,7 +7,7 @@
 #include "plumbline/features/frame_features.hpp"
 #include "plumbline/maps/fusion_state.hpp"
 #include "plumbline/maps/result_folder.hpp"
-#include "plumbline/maps/stored_result.hpp"
+#include "plumbline/maps/stored_run.hpp"
 
 namespace plumbline::python {
 namespace {
@@ -46,7 +46,7 @@ std::map<std::int32_t, std::string> names_of(const std::vector<maps::RobotInfo>&
 py::tuple read_landmarks(const fs::path& folder) {
   const auto stored = [&] {
     const py::gil_scoped_release free;
-    return value_of(maps::StoredResult::open(value_of(maps::find_map(folder))));
+    return value_of(maps::StoredRun::open_main(value_of(maps::find_map(folder))));
   }();
   const maps::Map& map = stored.stored().map;
   const geometry::Rigid3& output_from_map = stored.stored().result.output_from_map;

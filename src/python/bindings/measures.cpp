@@ -11,7 +11,7 @@
 #include "plumbline/evaluate/cloud.hpp"
 #include "plumbline/evaluate/trajectory.hpp"
 #include "plumbline/exports/export.hpp"
-#include "plumbline/maps/stored_result.hpp"
+#include "plumbline/maps/stored_run.hpp"
 #include "plumbline/pipeline/input.hpp"
 #include "plumbline/viz/snapshot.hpp"
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/maps/stored_result.hpp"
+#include "plumbline/maps/stored_run.hpp"
 
 #include <fmt/format.h>
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
+#include <algorithm>
 #include <system_error>
 #include <utility>
 
@@ -13,6 +14,7 @@
 #include "plumbline/core/config.hpp"
 #include "plumbline/maps/components.hpp"
 #include "plumbline/maps/fusion_state.hpp"
+#include "plumbline/maps/map_join.hpp"
 #include "plumbline/maps/output_folder.hpp"
 #include "plumbline/maps/stored_views.hpp"
 
@@ -58,30 +60,47 @@ core::Result<MapPlace> find_map(const fs::path& input) {
   return place;
 }
 
-StoredResult::StoredResult(fs::path file, StoreReader reader, StoredMap map)
+StoredRun::StoredRun(fs::path file, StoreReader reader, StoredMap map)
     : file_(std::move(file)),
       reader_(std::make_unique<StoreReader>(std::move(reader))),
       map_(std::move(map)) {}
 
-core::Result<StoredResult> StoredResult::open(const fs::path& store, const std::string& robot) {
+core::Result<StoredRun> StoredRun::open(const fs::path& store, const std::string& robot) {
   auto reader = StoreReader::open(store);
   if (!reader) return tl::unexpected(reader.error());
+  reader->read_ahead();
   auto map = reader->load(robot);
   if (!map) return tl::unexpected(map.error());
-  if (roots(map->map).size() > 1) {  // components that never joined have their own frames
-    map->map = component(map->map, main_root(map->map, map->frames));
-    map->frames = frames_in(map->map, std::move(map->frames));
-  }
-  return StoredResult(store, std::move(*reader), std::move(*map));
+  return StoredRun(store, std::move(*reader), std::move(*map));
 }
 
-MapPoses StoredResult::poses() const {
+core::Result<StoredRun> StoredRun::open_main(const fs::path& store, const std::string& robot) {
+  auto run = open(store, robot);
+  if (!run || roots(run->map_.map).size() < 2) return run;
+  StoredMap& whole = run->map_;
+  whole.map = component(whole.map, main_root(whole.map, whole.frames));
+  whole.frames = frames_in(whole.map, std::move(whole.frames));
+  return run;
+}
+
+void StoredRun::renumber(const RobotNumbers& numbers) {
+  numbers_ = numbers;
+  const auto stays = [](const auto& number) { return number.first == number.second; };
+  if (std::all_of(numbers.begin(), numbers.end(), stays)) return;
+  map_.map = renumbered(map_.map, numbers);
+  for (FramePose& frame : map_.frames) {
+    const auto found = numbers.find(frame.reference.robot);
+    if (frame.reference.valid() && found != numbers.end()) frame.reference.robot = found->second;
+  }
+}
+
+MapPoses StoredRun::poses() const {
   MapPoses poses = poses_of(map_.map, map_.frames);
   move(poses, map_.result.output_from_map);
   return poses;
 }
 
-std::vector<LineSegment3> StoredResult::lines() const {
+std::vector<LineSegment3> StoredRun::lines() const {
   std::vector<LineSegment3> segments = line_segments(map_.map);
   for (auto& [start, end] : segments) {
     start = map_.result.output_from_map * start;
@@ -90,7 +109,7 @@ std::vector<LineSegment3> StoredResult::lines() const {
   return segments;
 }
 
-cloud::DenseFusionOptions StoredResult::fusion_options() const {
+cloud::DenseFusionOptions StoredRun::fusion_options() const {
   cloud::DenseFusionOptions options;
   core::OptionTable table;
   options.declare(table);
@@ -104,7 +123,7 @@ cloud::DenseFusionOptions StoredResult::fusion_options() const {
   return options;
 }
 
-cloud::FilterChain StoredResult::fusion_filters() const {
+cloud::FilterChain StoredRun::fusion_filters() const {
   const auto root = core::parse_yaml(map_.header.configuration, file_.string());
   const core::ConfigNode* stage = root ? fuse_stage_of(*root) : nullptr;
   const core::ConfigNode* list = stage != nullptr ? stage->find("filters") : nullptr;
@@ -114,11 +133,11 @@ cloud::FilterChain StoredResult::fusion_filters() const {
   return problems.empty() && chain.writes().empty() ? chain : cloud::FilterChain();
 }
 
-core::Result<StoredViews> StoredResult::views() const {
-  return views_of(*reader_, poses_of(map_.map, map_.frames), map_.header.robots);
+core::Result<StoredViews> StoredRun::views() const {
+  return views_of(*reader_, poses_of(map_.map, map_.frames), map_.header.robots, {}, numbers_);
 }
 
-core::Result<FusionState> StoredResult::fusion_state() const {
+core::Result<FusionState> StoredRun::fusion_state() const {
   const auto kept = reader_->attachment(kFusionAttachment);
   if (!kept) return tl::unexpected(kept.error());
   if (!*kept) return FusionState{};
@@ -127,8 +146,8 @@ core::Result<FusionState> StoredResult::fusion_state() const {
   return state;
 }
 
-core::Result<cloud::FusedCloud> StoredResult::fused(const cloud::DenseFusionOptions& options,
-                                                    const core::Executor& executor) const {
+core::Result<cloud::FusedCloud> StoredRun::fused(const cloud::DenseFusionOptions& options,
+                                                 const core::Executor& executor) const {
   const auto stored = views();
   if (!stored) return tl::unexpected(stored.error());
   if (stored->size() == 0) {
@@ -151,7 +170,7 @@ core::Result<cloud::FusedCloud> StoredResult::fused(const cloud::DenseFusionOpti
   return fusion_filters().apply(std::move(*fused), options.voxels.voxel_m, executor);
 }
 
-core::Result<std::size_t> StoredResult::write_keyframe_clouds(const fs::path& folder) const {
+core::Result<std::size_t> StoredRun::write_keyframe_clouds(const fs::path& folder) const {
   const auto stored = views();
   if (!stored) return tl::unexpected(stored.error());
   return maps::write_keyframe_clouds(folder, *stored, map_.result.output_from_map,
@@ -163,7 +182,7 @@ core::Result<cloud::CloudFile> read_map_cloud(const MapPlace& place, const core:
   const bool written =
       place.result && (fs::exists(place.result->ply(), ec) || fs::exists(place.result->pcd(), ec));
   if (written || place.store.empty()) return read_result_cloud(*place.result);
-  const auto stored = StoredResult::open(place);
+  const auto stored = StoredRun::open_main(place);
   if (!stored) return tl::unexpected(stored.error());
   auto fused = stored->fused(stored->fusion_options(), executor);
   if (!fused) return tl::unexpected(fused.error());

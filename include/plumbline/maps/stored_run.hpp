@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A map in its store as results: clouds fused again, paths and lines; also of an interrupted run.
+// A run in its store, finished or interrupted: its map, its clouds fused again, paths and lines.
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -14,11 +14,11 @@
 #include "plumbline/core/executor.hpp"
 #include "plumbline/maps/result_folder.hpp"
 #include "plumbline/maps/store.hpp"
+#include "plumbline/maps/stored_views.hpp"
 
 namespace plumbline::maps {
 
 struct FusionState;
-struct StoredViews;
 
 /// A map as the user named it.
 struct MapPlace {
@@ -31,14 +31,25 @@ struct MapPlace {
 /// (kInput): nothing of these.
 core::Result<MapPlace> find_map(const std::filesystem::path& input);
 
-/// A store as it was when it was opened. All poses, lines and clouds are given in the frame of the run's
-/// results; of a run that was interrupted, in that of its first camera.
-class StoredResult {
+/// A run in its store, finished or interrupted, as it was when it was opened. Paths, lines and the fused
+/// cloud are given in the frame of the run's results; of a run that was interrupted, in that of its first
+/// camera.
+class StoredRun {
  public:
-  /// Errors (kInput) as StoreReader.
-  static core::Result<StoredResult> open(const std::filesystem::path& store, const std::string& robot = {});
-  static core::Result<StoredResult> open(const MapPlace& place) { return open(place.store, place.robot); }
+  /// `robot`: whose map, if those of several are not merged yet. Errors (kInput) as StoreReader.
+  static core::Result<StoredRun> open(const std::filesystem::path& store, const std::string& robot = {});
+  /// Without components that never joined: they have frames of their own.
+  static core::Result<StoredRun> open_main(const std::filesystem::path& store, const std::string& robot = {});
+  static core::Result<StoredRun> open_main(const MapPlace& place) {
+    return open_main(place.store, place.robot);
+  }
 
+  /// Gives the robots of its map other numbers.
+  void renumber(const RobotNumbers& numbers);
+  [[nodiscard]] const RobotNumbers& numbers() const { return numbers_; }
+
+  [[nodiscard]] const std::filesystem::path& file() const { return file_; }
+  /// Its header has the store's numbers of robots, the map and the frames those that were given last.
   [[nodiscard]] const StoredMap& stored() const { return map_; }
   /// Tracked frames, by robot, then time.
   [[nodiscard]] geometry::Trajectory trajectory() const { return poses().trajectory; }
@@ -68,12 +79,13 @@ class StoredResult {
   [[nodiscard]] core::Result<FusionState> fusion_state() const;
 
  private:
-  StoredResult(std::filesystem::path file, StoreReader reader, StoredMap map);
+  StoredRun(std::filesystem::path file, StoreReader reader, StoredMap map);
   [[nodiscard]] MapPoses poses() const;
 
   std::filesystem::path file_;
   std::unique_ptr<StoreReader> reader_;
   StoredMap map_;
+  RobotNumbers numbers_;
 };
 
 /// result.ply(), result.pcd() or, where neither was written, the store's cloud.
