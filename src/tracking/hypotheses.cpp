@@ -118,7 +118,7 @@ bool Tracker::jumps(double stamp, const Rigid3& camera_from_world) const {
 std::optional<TrackResult> Tracker::track_with_motion_model(const maps::Map& map,
                                                             const sensor::RgbdFrame& frame,
                                                             const features::FrameFeatures& features) const {
-  constexpr double kClearly = 1.15;  // a jump needs this much more support than the pose near by
+  constexpr double kClearly = 1.15;  // more support than the pose near by, or than the likeliest one
   if (motion_.expired()) return std::nullopt;
 
   const PoseHypotheses hypotheses = pose_hypotheses(map, frame, features);
@@ -138,8 +138,10 @@ std::optional<TrackResult> Tracker::track_with_motion_model(const maps::Map& map
         attempt = std::move(near);
     }
 
-    if (tracked(attempt) && (!best || support(attempt) > support(*best))) best = std::move(attempt);
-    if (best && !hypotheses.searched) break;
+    const double share = hypotheses.searched ? 1.0 : kClearly;
+    if (tracked(attempt) && (!best || support(attempt) > share * support(*best))) best = std::move(attempt);
+    // A pose that jumps may fit another copy of the same landmarks: the other hypotheses are tried as well.
+    if (best && !hypotheses.searched && !jumps(frame.stamp, best->camera_from_world)) break;
   }
 
   return best;
