@@ -321,5 +321,21 @@ TEST_F(MapCommand, AGeneratedWorldIsARecordingToo) {
   EXPECT_TRUE(typo.told("room")) << typo;
 }
 
+/// A hand that turns a Kinect fast, back to where it began: landmarks are there twice, some centimetres
+/// apart. No frame may be found on the other copy.
+TEST_F(MapCommand, AFastTurnTearsNoPath) {
+  const char* data = std::getenv("PLUMBLINE_DATA");
+  const fs::path recording = fs::path(data == nullptr ? "" : data) / "tum_fr1_rpy_b";
+  if (data == nullptr || !fs::is_directory(recording)) GTEST_SKIP() << "PLUMBLINE_DATA has no tum_fr1_rpy_b";
+
+  const Outcome o = run("map '" + recording.string() + "' --from 0.4 -o out -q" + kNoPictures);
+  ASSERT_EQ(o.code, 0) << o;
+  const Outcome judged = run("evaluate trajectory out '" + recording.string() + "' --json");
+  ASSERT_EQ(judged.code, 0) << judged;
+  const auto report = nlohmann::json::parse(judged.out);
+  EXPECT_EQ(report["matched"], report["poses"]);
+  EXPECT_LT(report["rpe"]["per_frame"]["translation_m"]["max"].get<double>(), 0.035);
+}
+
 }  // namespace
 }  // namespace plumbline::integration
