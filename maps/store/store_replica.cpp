@@ -186,7 +186,7 @@ void StoreReplica::Impl::apply_row(const StoreRow& row) {
       .run();
 }
 
-/// What was committed to the file, to the decoded map.
+/// Applies the rows that were committed to the file to the decoded map.
 void StoreReplica::Impl::apply_changes() {
   map.robots = robots;
   for (Change& change : changes) {
