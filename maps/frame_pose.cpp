@@ -9,6 +9,15 @@
 
 namespace plumbline::maps {
 
+bool became_keyframe(const FramePose& frame, const Map& map) {
+  return frame.tracked && map.has_keyframe(frame.reference) &&
+         map.keyframe(frame.reference).stamp == frame.stamp;
+}
+
+bool is_between_keyframes(const FramePose& frame, const Map& map) {
+  return frame.tracked && map.has_keyframe(frame.reference) && !became_keyframe(frame, map);
+}
+
 geometry::Trajectory trajectory(const std::vector<FramePose>& frames, const Map& map) {
   geometry::Trajectory result;
   for (const FramePose& frame : frames) {

@@ -175,9 +175,10 @@ std::string understood(const ChosenCamera& chosen, const sensor::Camera& camera,
                                  distortion_text(camera));
   text +=
       fmt::format("; size {}x{} {}", p.width, p.height, reading.has_size ? "(file)" : "(from the images)");
-  text += fmt::format(
-      "; depth scale {:g} {}", camera.depth_scale,
-      reading.has_depth_scale ? "(file)" : fmt::format("(usual in the layout {})", layout.format));
+  text += fmt::format("; depth scale {:g} {}", camera.depth_scale,
+                      reading.has_depth_scale && !chosen.of_layout
+                          ? "(file)"
+                          : fmt::format("(usual in the layout {})", layout.format));
   if (camera.depth) text += fmt::format("; depth camera {}x{}", camera.depth->width, camera.depth->height);
   for (const std::string& note : reading.notes) text += "; " + note;
   return text;

@@ -99,9 +99,7 @@ class RunViews {
   void add_frames(std::size_t most) {
     std::vector<const maps::FramePose*> frames;
     for (const maps::FramePose& frame : *run_.frames) {
-      if (frame.seen == nullptr || !frame.tracked || !run_.map->has_keyframe(frame.reference)) continue;
-      const bool is_keyframe = run_.map->keyframe(frame.reference).stamp == frame.stamp;
-      if (!is_keyframe) frames.push_back(&frame);
+      if (frame.seen != nullptr && maps::is_between_keyframes(frame, *run_.map)) frames.push_back(&frame);
     }
 
     for (const maps::FramePose* chosen : thinned(frames, most)) {

@@ -116,8 +116,17 @@ def check_commands(root, help_of):
     return problems
 
 
+def check_layouts(root, help_of):
+    """The page of inputs has a row for each layout that --format takes."""
+    listed = re.search(r"--format TEXT:\{([^}]*)\}", help_of(("map",)) or "")
+    page = root / "docs" / "guide" / "inputs.md"
+    text = page.read_text() if page.is_file() else ""
+    return [f"docs/guide/inputs.md: there is no row for --format {name}" for name in
+            (listed.group(1).split(",") if listed else []) if name != "auto" and f"| `{name}` |" not in text]
+
+
 def check(root, help_of):
-    return (check_links(root) + check_index(root) + check_citations(root) + check_length(root) +
+    return (check_layouts(root, help_of) + check_links(root) + check_index(root) + check_citations(root) + check_length(root) +
             check_commands(root, help_of))
 
 

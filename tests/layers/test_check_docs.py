@@ -61,6 +61,13 @@ class CheckDocs(unittest.TestCase):
         self.write("docs/guide/b.md", "words\n" * 1801)
         self.assertEqual(self.problems(), ["docs/guide: 1801 lines; 1800 at most"])
 
+    def test_layout_without_a_row(self):
+        before, HELP[("map",)] = HELP[("map",)], HELP[("map",)] + " --format TEXT:{auto,tum,mine} Layout"
+        self.addCleanup(HELP.__setitem__, ("map",), before)
+        self.write("docs/README.md", "[a](a.md) [notes](notes/README.md) [b](guide/inputs.md)\n")
+        self.write("docs/guide/inputs.md", "| `tum` | a folder |\n")
+        self.assertEqual(self.problems(), ["docs/guide/inputs.md: there is no row for --format mine"])
+
     def test_page_that_is_not_listed(self):
         self.write("docs/b.md", "words\n")
         self.assertEqual(self.problems(), ["docs/README.md:1: does not list b.md"])

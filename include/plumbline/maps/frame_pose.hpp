@@ -44,6 +44,11 @@ struct FramePose {
   std::shared_ptr<const SeenPoints> seen = nullptr;
 };
 
+/// True if the frame has a pose in `map` and became its reference keyframe.
+bool became_keyframe(const FramePose& frame, const Map& map);
+/// True if the frame has a pose in `map` and lies between keyframes.
+bool is_between_keyframes(const FramePose& frame, const Map& map);
+
 /// A step between neighbouring frames of the present path, with its difference from the tracker's
 /// measurement.
 struct PathStep {

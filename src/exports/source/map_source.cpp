@@ -26,10 +26,11 @@ namespace {
 namespace fs = std::filesystem;
 
 /// True if the input is a single cloud file.
+/// By its ending, whether it is there or not: who names a cloud is told of a cloud.
 bool is_cloud_file(const fs::path& input) {
   constexpr std::array<const char*, 7> kEndings = {".ply", ".pcd", ".xyz", ".txt", ".csv", ".asc", ".pts"};
   std::error_code ec;
-  return fs::is_regular_file(input, ec) &&
+  return !fs::is_directory(input, ec) &&
          std::any_of(kEndings.begin(), kEndings.end(),
                      [&](const char* ending) { return input.extension() == ending; });
 }

@@ -102,10 +102,6 @@ bool has_pose(const maps::FramePose& frame, const maps::Map& map) {
   return frame.tracked && map.has_keyframe(frame.reference);
 }
 
-bool is_between(const maps::FramePose& frame, const maps::Map& map) {
-  return has_pose(frame, map) && map.keyframe(frame.reference).stamp != frame.stamp;
-}
-
 /// Frames between keyframes, which stay where they are, tied to these by beliefs and to each other by steps.
 struct FrameChain {
   optimize::PoseGraph graph;
@@ -132,7 +128,7 @@ FrameChain chain_of(const std::vector<maps::FramePose>& frames, const maps::Map&
     int node = has_pose(frames[i], map) ? keyframes.at(frames[i].reference) : -1;
 
     // Its belief.
-    if (is_between(frames[i], map)) {
+    if (maps::is_between_keyframes(frames[i], map)) {
       const int keyframe = std::exchange(node, static_cast<int>(chain.graph.poses.size()));
       chain.graph.poses.push_back({beliefs[i].b_from_a * map.camera_from_world(frames[i].reference), false});
       tie(beliefs[i], keyframe, node);
@@ -155,7 +151,7 @@ void solve_frames_again(const sensor::ImageModel& model, const maps::Map& map,
                         const core::Executor& executor, std::vector<maps::FramePose>& frames) {
   std::vector<optimize::GraphEdge> beliefs(frames.size());
   executor.parallel_for(frames.size(), [&](std::size_t i) {
-    if (!is_between(frames[i], map)) return;
+    if (!maps::is_between_keyframes(frames[i], map)) return;
     beliefs[i] = belief_of(frames[i], before[i].camera_from_reference, model, map,
                            geometry::velocity_at(path_before, frames[i].stamp));
   });
@@ -164,7 +160,7 @@ void solve_frames_again(const sensor::ImageModel& model, const maps::Map& map,
   if (!optimize::solve_pose_graph(chain.graph, false).usable) return;
 
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    if (!is_between(frames[i], map)) continue;
+    if (!maps::is_between_keyframes(frames[i], map)) continue;
     const auto node = static_cast<std::size_t>(chain.nodes[i]);
     frames[i].camera_from_reference =
         chain.graph.poses[node].camera_from_world * map.camera_from_world(frames[i].reference).inverse();

@@ -182,7 +182,7 @@ class MapRecalibration {
         frame.camera_from_previous = corrected(*frame.camera_from_previous, image_of(*previous), image, seen);
       }
 
-      if (map_.keyframe(frame.reference).stamp != frame.stamp) {
+      if (maps::is_between_keyframes(frame, map_)) {
         frame.camera_from_reference =
             corrected(before, images_.at(frame.reference), image, samples_.at(frame.reference));
       }
