@@ -90,6 +90,7 @@ core::Result<void> StoredMaps::arrange(const core::Executor& executor) {
   });
 
   std::vector<StoredPart> sorted;
+  sorted.reserve(order.size());
   for (const std::size_t i : order) sorted.push_back(std::move(parts_[i]));
   parts_ = std::move(sorted);
 

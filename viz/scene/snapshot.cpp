@@ -143,6 +143,7 @@ Projection choose_projection(const Scene& scene, const SnapshotOptions& options,
     return directions;
   }
   std::vector<double> depths;
+  depths.reserve(sample.size());
   for (const auto& p : sample) depths.push_back((p - directions.eye).dot(directions.forward));
   directions.near_m = 0.05;
   directions.far_m = std::max(1.0, 1.5 * core::quantile(depths, 0.99, 0.0));
@@ -299,15 +300,15 @@ class Renderer {
       band.first = kSupersampling * first_px - kMargin;
       const std::size_t place = static_cast<std::size_t>(k) % kAtATime;
       jobs[place].wait();
-      jobs[place] = executor_.submit([&, first_px, first = band.first, &raster = rasters_[place],
-                                      over = window_->draw()] {
-        raster.clear(first, kBackground);
-        draw_band(scene, drawn, raster);
-        cv::Mat3b part = picture.rowRange(first_px, std::min(first_px + kBand_px, picture.rows));
-        const cv::Range rows(kMargin, kMargin + kSupersampling * part.rows);
-        cv::resize(composited(raster.picture().rowRange(rows), over.rowRange(rows)), part, part.size(), 0.0,
-                   0.0, cv::INTER_AREA);
-      });
+      jobs[place] = executor_.submit(
+          [&, first_px, first = band.first, &raster = rasters_[place], over = window_->draw()] {
+            raster.clear(first, kBackground);
+            draw_band(scene, drawn, raster);
+            cv::Mat3b part = picture.rowRange(first_px, std::min(first_px + kBand_px, picture.rows));
+            const cv::Range rows(kMargin, kMargin + kSupersampling * part.rows);
+            cv::resize(composited(raster.picture().rowRange(rows), over.rowRange(rows)), part, part.size(),
+                       0.0, 0.0, cv::INTER_AREA);
+          });
     }
 
     for (core::Executor::Job& job : jobs) job.wait();

@@ -35,7 +35,7 @@ geometry::Rigid3 pose_of(const SharedFrame& frame) {
   return {Eigen::Quaterniond(p[6], p[3], p[4], p[5]), Eigen::Vector3d(p[0], p[1], p[2])};
 }
 
-HubMeetings::HubMeetings(std::filesystem::path folder, const core::Executor& executor, core::Log& log)
+HubMeetings::HubMeetings(const std::filesystem::path& folder, const core::Executor& executor, core::Log& log)
     : executor_(&executor), log_(&log), reported_(folder, log) {
   std::error_code ignored;
   std::filesystem::remove_all(folder / "meetings", ignored);

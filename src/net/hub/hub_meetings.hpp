@@ -24,7 +24,7 @@ geometry::Rigid3 pose_of(const SharedFrame& frame);
 class HubMeetings {
  public:
   /// `folder`: of the result; meetings that an earlier process left there are removed.
-  HubMeetings(std::filesystem::path folder, const core::Executor& executor, core::Log& log);
+  HubMeetings(const std::filesystem::path& folder, const core::Executor& executor, core::Log& log);
 
   /// The copy of a robot's store has new rows of its map.
   void mark_changed(const std::string& robot) { changed_.insert(robot); }
