@@ -136,6 +136,7 @@ void check_header(const std::string& key, const Bytes& bytes, std::vector<RobotI
       demand(robot.number >= 0 && robot.number <= kMostRobots, "an id is out of range");
       check(robot.camera);
     }
+
   } else if (key == "cameras") {
     for (const CameraVersions& of : decode<std::vector<CameraVersions>>(plain(kMostSmall))) {
       for (const CameraVersion& version : of.versions) {
@@ -143,11 +144,11 @@ void check_header(const std::string& key, const Bytes& bytes, std::vector<RobotI
         demand(version.first_keyframe >= 0 && version.first_frame >= 0, "a camera's version is out of range");
       }
     }
+
   } else if (key == "result") {
     check(decode<ResultFrame>(plain(kMostSmall)).output_from_map);
   } else {
     const bool known = key == "input" || key == "program" || key == "configuration" || key == "complete";
-
     demand(known, "nothing has this name");
   }
 }
@@ -183,6 +184,7 @@ RowContent check_row(const RowName& name, const Bytes& bytes, std::vector<RobotI
     check_header(name.key, bytes, robots);
     return {};
   }
+
   if (table == "attachment") {
     plain(kMostPlain);
     return {};
@@ -191,11 +193,13 @@ RowContent check_row(const RowName& name, const Bytes& bytes, std::vector<RobotI
     decode_surface(plain(kMostPlain));
     return {};
   }
+
   if (table == "cloud" || table == "frame_cloud") {
     check_cloud(bytes);
     return {};
   }
 
+  // Rows of a map.
   const std::size_t most = table == "map" || table == "keyframe" ? kMostPlain
                            : table == "state" || table == "edge" ? kMostSmall
                                                                  : kMostPage;

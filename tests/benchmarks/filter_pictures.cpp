@@ -94,6 +94,7 @@ void run(const fs::path& folder, const std::vector<std::string>& wanted) {
   const fs::path scratch = fs::temp_directory_path() / "plumbline_filter_pictures";
   fs::create_directories(scratch);
   const cloud::CloudPtr cloud = film(source / "pipelines", executor);
+
   // merge gets what a box holds, turned about: something that was not there.
   auto other = std::make_shared<cloud::Cloud>(*cloud);
   for (cloud::Point& p : other->points) {
@@ -103,12 +104,15 @@ void run(const fs::path& folder, const std::vector<std::string>& wanted) {
   fs::current_path(scratch);
   if (auto written = cloud::write_ply("other.ply", *other); !written)
     throw std::runtime_error(written.error().message);
+
   cloud::FilterContext context;
   context.viewpoint = Eigen::Vector3f::Zero();
   context.executor = &executor;
+
   for (const std::string& type : cloud::builtin_filters().types()) {
     if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), type) == wanted.end()) continue;
     const fs::path example = source / "pipelines/filters/examples" / (type + ".yaml");
+
     const auto before = must(load_part(example, 1).apply(cloud, context));
     const auto after = must(load_part(example, 0).apply(cloud, context));
     const viz::ColorMode color = color_for(type);

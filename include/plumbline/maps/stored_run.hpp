@@ -46,7 +46,6 @@ class StoredRun {
 
   /// Gives the robots of its map other numbers.
   void renumber(const RobotNumbers& numbers);
-  [[nodiscard]] const RobotNumbers& numbers() const { return numbers_; }
 
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
   /// Its header has the store's numbers of robots, the map and the frames those that were given last.

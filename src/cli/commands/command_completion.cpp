@@ -228,6 +228,7 @@ void add_completion(CLI::App& app, Session& session) {
                                     fmt::print("{}", *script);
                                     return {};
                                   });
+
   command->add_option("SHELL", *shell, "The shell")
       ->required()
       ->check(CLI::IsMember({"bash", "zsh", "fish"}));

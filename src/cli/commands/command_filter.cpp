@@ -143,6 +143,7 @@ core::Result<void> describe_filter(const std::string& name, const Session& sessi
     return core::usage_error(
         fmt::format("there is no filter '{}'{}", name, core::hint(name, registry->types())));
   }
+
   fmt::print("{}: {}\n\n{}\n\noptions:\n", info->type, info->summary, info->details);
   core::OptionTable table;
   const auto made = info->make();
@@ -150,6 +151,7 @@ core::Result<void> describe_filter(const std::string& name, const Session& sessi
   for (const core::OptionSpec& spec : table.specs()) {
     fmt::print("  {:<20} {} (default: {})\n", spec.key, spec.help, spec.default_value);
   }
+
   fmt::print("\nexample:\n{}\n", info->example);
   return {};
 }

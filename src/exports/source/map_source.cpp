@@ -153,6 +153,7 @@ core::Result<void> MapSource::open_map() {
   auto stored = maps::StoredRun::open_main(place_);
   if (!stored) return tl::unexpected(stored.error());
   store_.emplace(std::move(*stored));
+
   const maps::StoredMap& map = store_->stored();
   world_from_map_ = map.result.output_from_map;
   upright_ = map.result.upright;

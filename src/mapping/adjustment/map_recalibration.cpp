@@ -99,6 +99,7 @@ class MapRecalibration {
     const std::vector<PoseEdge> relative = relative_poses();  // as the map has them, corrected
     correct_edges();
     correct_frames();
+
     make_keyframes_anew();
     move_keyframes(relative);
     move_landmarks();

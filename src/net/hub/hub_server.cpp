@@ -85,6 +85,7 @@ core::Result<void> HubServer::look_for_others(const core::StopToken& stop) {
     publisher_.publish_presence();
     bus_->wait(kWait);
     for (ReceivedStatus& received : bus_->poll_robots()) early.push_back(std::move(received));
+
     for (const HubStatus& other : bus_->poll_hubs()) {
       // If two hubs start together, the one with the lower id stays.
       const bool stays = other.up_s >= 0.0 || other.hub < publisher_.id();
@@ -298,6 +299,7 @@ void HubServer::serve(const core::StopToken& stop, const Status& status) {
   while (!stop.stop_requested()) {
     bus_->wait(kWait);
     poll();
+
     if (meetings_.step(robots_)) {
       for (auto& [name, session] : robots_) {
         session.changed = true;
@@ -305,6 +307,7 @@ void HubServer::serve(const core::StopToken& stop, const Status& status) {
         if (request_.placed && !frame.frame_of.empty()) request_.placed(name, pose_of(frame));
       }
     }
+
     publish_all();
     feedback_.step(robots_, meetings_, *bus_);
     show_.step(robots_, meetings_);

@@ -67,17 +67,20 @@ class StoreStage : public Stage {
     if (!writer_) return {};
     const auto track = io.input<TrackedFrame>("track");
     const auto cloud = io.input<KeyframeCloud>("cloud");
+
     std::vector<maps::StoreCloud> clouds;
     if (cloud != nullptr && (cloud->id.valid() || cloud->frame.valid())) {
       auto waiting = store_cloud_of(*cloud);
       if (!waiting) return tl::unexpected(waiting.error());
       clouds.push_back(std::move(*waiting));
     }
+
     if (track != nullptr) {
       maps::StoreStep& step = steps_[track->robot];
       step.robot = track->robot;
       step.log.push_back(to_line(track->row));
       if (track->pose) step.frames.push_back(*track->pose);
+
       if (track->keyframe.valid()) {
         if (const auto frame = io.input<sensor::RgbdFrame>("frame"))
           add_picture(track->keyframe, frame->color, step.pictures);
@@ -90,6 +93,7 @@ class StoreStage : public Stage {
   core::Result<void> finish(StageIo& io) override {
     const auto map = io.input<MapResult>("map");
     if (!writer_ || map->map == nullptr) return {};
+
     maps::ResultFrame frame;
     if (const auto dense = io.input<DenseCloud>("result")) {
       frame = {dense->output_from_map, dense->upright};
@@ -97,11 +101,13 @@ class StoreStage : public Stage {
         if (auto kept = writer_->attach(maps::kFusionAttachment, to_bytes(*dense->state)); !kept) return kept;
       }
     }
+
     std::vector<maps::StoreStep> rest;
     for (auto& [robot, step] : steps_) rest.push_back(std::move(step));
     rest.emplace_back();
     rest.back().pictures =
         context_->input.stored_maps != nullptr ? stored_pictures() : corrected_pictures(*map);
+
     auto saved = map->apart.empty()
                      ? writer_->save_final(*map->map, map->frame_poses, frame, rest, map->robots)
                      : writer_->save_final(with_components(*map), frames_with_components(*map), frame, rest,

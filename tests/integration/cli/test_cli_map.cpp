@@ -35,11 +35,13 @@ TEST_F(MapCommand, WritesTheWholeResultFolder) {
     EXPECT_GT(fs::file_size(path("out") / file), 0U) << file;
   }
   EXPECT_FALSE(fs::exists(path("out.partial")));
+
   const nlohmann::json summary = read_json(path("out/summary.json"));
   EXPECT_EQ(summary["frames"]["read"], 12);
   EXPECT_EQ(summary["frames"]["tracked"], 12);
   EXPECT_EQ(summary["frames"]["tracked_percent"], 100.0);
   EXPECT_GT(summary["cloud"]["points"], 1000);
+
   const nlohmann::json& timing = summary["timing"];
   const double mapping_s = timing["wall_s"].get<double>() - timing["export_s"].get<double>();
   EXPECT_NEAR(timing["fps"].get<double>() * mapping_s, 12.0, 0.1);
