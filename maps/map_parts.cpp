@@ -16,7 +16,7 @@ void require(bool holds, const char* otherwise) {
   if (!holds) contradiction(otherwise);
 }
 
-/// Inserts without observations, which are then made one by one so that covisibility follows.
+/// Inserts landmarks without observations; these are then added one by one, which updates covisibility.
 template <typename IdType, typename Landmark>
 void restore_landmarks(Map& map, IdMap<IdType, Landmark>& landmarks, std::vector<Landmark>& parts) {
   for (Landmark& part : parts) {

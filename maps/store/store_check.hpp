@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Checks rows from a stranger before they are stored.
+// Checks rows from an untrusted sender before they are stored.
 #include <vector>
 
 #include "store/map_rows.hpp"

@@ -83,7 +83,7 @@ core::Result<StoreReader> StoreReader::open(const std::filesystem::path& file) {
 
 const StoreHeader& StoreReader::header() const { return impl_->header; }
 
-/// In parts: of more at a time only the beginning is read.
+/// Requests the file in parts: of a longer request the system reads only the beginning.
 void StoreReader::read_ahead() const {
 #ifdef POSIX_FADV_WILLNEED
   constexpr off_t kPart = 4 << 20;

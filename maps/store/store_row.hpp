@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A row on its way from a store to its copy. As bytes: the number that follow (32 bits), the table's index
-// and whether the row is removed (one byte), its key, its SQLite type (one byte), its content.
+// A row on its way from a store to its copy. As bytes: the number of bytes that follow (32 bits), the table's
+// index and whether the row is removed (one byte), its key, its SQLite type (one byte), its content.
 #include <sqlite3.h>
 
 #include <functional>

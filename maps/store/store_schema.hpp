@@ -44,7 +44,7 @@ void create_tables(Database& database);
 void put_header(Database& database, const StoreHeader& header);
 /// Numbers of the last transactions that wrote or removed a row.
 StoreHeads read_heads(Database& database);
-/// True: nothing was ever committed.
+/// True if nothing was ever committed.
 bool is_blank(Database& database);
 /// Throws a StoreFailure for a foreign, unfinished, older or newer file.
 void check_store(Database& database);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// SQLiteCpp in the words of stores: rows hold packed bytes, errors end as core::Result at the store's public
+// SQLiteCpp adapted to stores: rows hold packed bytes, errors end as core::Result at the store's public
 // functions.
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <sqlite3.h>
@@ -50,7 +50,7 @@ class Statement : public SQLite::Statement {
     }
     return *this;
   }
-  /// True: there is a row. After the last one, and after run(), the statement is ready for new values.
+  /// True if there is a row. After the last one, and after run(), the statement is ready for new values.
   bool step();
   void run() {
     while (step()) {
@@ -65,7 +65,7 @@ class Statement : public SQLite::Statement {
 /// Rolls back unless committed.
 class Transaction : public SQLite::Transaction {
  public:
-  /// A writing one waits its turn at once instead of at its first change.
+  /// A writing transaction waits for its turn here instead of at its first change.
   Transaction(Database& database, bool writes)
       : SQLite::Transaction(database, writes ? SQLite::TransactionBehavior::IMMEDIATE
                                              : SQLite::TransactionBehavior::DEFERRED) {}

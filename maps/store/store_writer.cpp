@@ -131,26 +131,26 @@ struct StoreWriter::Impl {
   void put_map(const MapChanges& map, std::int32_t robot);
   void mirror_keyframes(const MapChanges& map, std::int32_t robot);
   void mirror_edges(const MapChanges& map, std::int32_t robot);
-  /// From now on keyframes and edges that are there are put again, if a camera became another.
+  /// Makes later rounds write keyframes and edges again if a camera has changed.
   void put_robots_of_map(const std::vector<RobotInfo>& all);
   void put_seen(FrameId frame, const SeenPoints& seen);
   void put_map_row(const MapChanges& map, std::int32_t robot);
   void put_cloud(const StoreCloud& cloud);
   void put_picture(const StorePicture& picture);
   void put_extras(const StoreStep& step);
-  /// All there is of the only map and its frames.
+  /// Writes everything of the only map and its frames.
   void write(const Map& map, const std::vector<FramePose>& poses);
-  /// `change` in a transaction; if it fails, the mirrors are reloaded from the file.
+  /// Runs `change` in a transaction; if it fails, the mirrors are reloaded from the file.
   template <typename Change>
   core::Result<void> transact(const Change& change);
 
   std::filesystem::path file;
   std::unique_ptr<Database> database;
-  std::int64_t transaction;  ///< number of the last one, or of the one under way
+  std::int64_t transaction;  ///< number of the last one, or of the one in progress
   Mirror maps, keyframes, states, points, lines, edges, frames, log;
   std::vector<RobotInfo> robots;  ///< as in the file
   /// Keyframes and edges were recomputed for another camera: those in the file are not kept.
-  bool anew = false;
+  bool recomputed = false;
   ByRobot<FramePose> frame_lists;  ///< as in the file
   ByRobot<std::string> log_lines;  ///< as in the file
 };
@@ -161,7 +161,7 @@ void StoreWriter::Impl::put_map(const MapChanges& map, std::int32_t robot) {
   mirror_landmarks(map.lines, map.whole, robot, lines);
   mirror_edges(map, robot);
   put_map_row(map, robot);
-  anew = false;
+  recomputed = false;
 }
 
 void StoreWriter::Impl::put_robots_of_map(const std::vector<RobotInfo>& all) {
@@ -170,8 +170,8 @@ void StoreWriter::Impl::put_robots_of_map(const std::vector<RobotInfo>& all) {
     for (const RobotInfo& robot : of) count += robot.versions.size();
     return count;
   };
-  anew = versions(all) != versions(robots);
-  if (anew) put_camera_versions(*database, transaction, all);
+  recomputed = versions(all) != versions(robots);
+  if (recomputed) put_camera_versions(*database, transaction, all);
   if (encoded(all) != encoded(robots)) put_robots(*database, transaction, all);
   robots = all;
 }
@@ -189,7 +189,7 @@ void StoreWriter::Impl::mirror_keyframes(const MapChanges& map, std::int32_t rob
   states.begin_round();
   for (const MapParts::KeyframePart& part : map.keyframes) {
     const Mirror::Key key = key_of(part.data->id);
-    if (anew || !keyframes.mark_unchanged(key)) keyframes.put(key, encoded(*part.data));
+    if (recomputed || !keyframes.mark_unchanged(key)) keyframes.put(key, encoded(*part.data));
     states.put(key, encoded(KeyframeState{part.camera_from_world, part.parent}));
   }
   keyframes.delete_unmarked(robot);
@@ -200,7 +200,7 @@ void StoreWriter::Impl::mirror_edges(const MapChanges& map, std::int32_t robot) 
   edges.begin_round();
   for (const auto& [number, edge] : map.edges) {
     const Mirror::Key key{edge.a.robot, static_cast<std::int64_t>(number)};
-    if (anew || !edges.mark_unchanged(key)) edges.put(key, encoded(EdgeRow{number, edge}));
+    if (recomputed || !edges.mark_unchanged(key)) edges.put(key, encoded(EdgeRow{number, edge}));
   }
   for (const auto& [number, owner] : map.edge_names)
     edges.mark_present({owner, static_cast<std::int64_t>(number)});

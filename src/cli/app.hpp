@@ -28,7 +28,7 @@ struct Session {
   std::string pipelines_dir;
   std::vector<std::string> plugins;  ///< shared objects with filters, of the commands that take --plugin
 
-  std::function<int()> command;  ///< of the command that was named; returns the exit code
+  std::function<int()> command;  ///< runs the command that was named; returns the exit code
 
   [[nodiscard]] core::Result<std::filesystem::path> pipelines_folder() const;
   /// The built-in filters and those of the plugins.
@@ -63,19 +63,19 @@ void add_progress_option(CLI::App& command, Session& session);
 void add_pipeline_options(CLI::App& command, Session& session, pipeline::RunRequest& request);
 /// Adds the options common to all commands that map a recording.
 void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& request);
-/// --from S and --to S, for commands that read recordings.
-/// "701362 4485513 0 m (...)": what was taken off large coordinates while reading a cloud.
+/// "701362 4485513 0 m (...)": the shift subtracted from large coordinates when a cloud was read.
 std::string shift_text(const Eigen::Vector3d& shift);
-
+/// --from S and --to S, for commands that read recordings.
 void add_time_range(CLI::App& command, dataset::OpenOptions& open);
-/// Lets a command take live cameras: --for, --record.
+/// --for and --record, for commands that map live cameras.
 void add_live_options(CLI::App& command, pipeline::MapRequest& request);
 /// --publish, for commands that make a map.
 void add_publish_option(CLI::App& command, std::string& address);
-/// Makes the observer for the option's value; `names`, `name`: as for open_ros2_publisher.
+/// Sets request.observer to a publisher to `address`, the value of --publish; `names`, `name`: as for
+/// open_ros2_publisher.
 core::Result<void> prepare_publisher(Session& session, const std::string& address, net::PublishedNames names,
                                      const std::string& name, pipeline::RunRequest& request);
-/// To be called once they are parsed: sets the function that opens addresses, and the stop token.
+/// Called after the command line is parsed: sets the function that opens addresses, and the stop token.
 void prepare_live(pipeline::MapRequest& request);
 /// --topic, for commands that read recordings, which may be bags.
 void add_topic_option(CLI::App& command, dataset::OpenOptions& open);

@@ -36,8 +36,8 @@ std::string escaped_for_pattern(const std::string& text) {
   return out;
 }
 
-/// A bare number in range, or a text of number and unit. The unit may be missing in the text: YAML 1.1
-/// readers take "1e3" for text.
+/// A bare number in range, or a text of number and unit. The unit may be missing in the text, because
+/// YAML 1.1 reads "1e3" as text.
 Json number_schema(const OptionSpec& spec) {
   Json number;
   number["type"] = spec.type == OptionType::kInteger ? "integer" : "number";

@@ -23,7 +23,7 @@ Bytes pack(const Bytes& bytes) {
 
 Bytes unpack(const std::uint8_t* bytes, std::size_t size, std::size_t most_bytes) {
   const unsigned long long length = ZSTD_getFrameContentSize(bytes, size);
-  // zstd packs at most about 2^17 times: data that promise more are damaged, and take no memory.
+  // zstd packs at most about 2^17 times: for data that promise more, which are damaged, nothing is allocated.
   const unsigned long long most =
       std::min<unsigned long long>(most_bytes, static_cast<unsigned long long>(size) << 17U);
   if (length == ZSTD_CONTENTSIZE_UNKNOWN || length == ZSTD_CONTENTSIZE_ERROR || length > most) {

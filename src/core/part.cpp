@@ -27,8 +27,7 @@ void* own_object() {
 }
 
 /// Folders in which the dynamic linker looks for the libraries of that object: its RUNPATH, then the system's
-/// folders. dlopen would look there itself, but not when a sanitizer stands between. Never the current
-/// folder.
+/// folders. dlopen searches them itself, but not under a sanitizer. Never the current folder.
 std::vector<fs::path> library_folders() {
   void* program = own_object();
   Dl_serinfo head{};

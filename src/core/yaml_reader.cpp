@@ -95,11 +95,11 @@ class TreeBuilder : public YAML::EventHandler {
   struct Open {
     ConfigNode node;
     YAML::anchor_t anchor = 0;
-    bool has_key = false;  ///< of a map: the next node is the value of `key`
+    bool has_key = false;  ///< in a map: the next node is the value of `key`
     bool duplicate = false;
     std::string key;
     ConfigMark key_mark;
-    std::map<std::string, int> lines;  ///< of the keys so far
+    std::map<std::string, int> lines;  ///< line of each key so far
   };
   struct Anchored {
     ConfigNode node;

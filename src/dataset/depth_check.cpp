@@ -39,8 +39,8 @@ core::Result<DepthStatistics> sample_depth(const FrameSource& source, const std:
                                          source.size(), first_error));
   }
 
-  return core::input_error(
-      fmt::format("{}: the depth images hold no measurement at all (raw 0 and 65535 are none)", folder));
+  return core::input_error(fmt::format(
+      "{}: the depth images hold no measurement at all (raw 0 and 65535 are not measurements)", folder));
 }
 
 }  // namespace

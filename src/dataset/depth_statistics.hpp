@@ -15,7 +15,7 @@ class DepthStatistics {
   [[nodiscard]] std::optional<double> median() const;
   /// Share of the measured pixels; 0 if there are none.
   [[nodiscard]] double share_beyond(double depth_m) const;
-  [[nodiscard]] double missing_share() const;  ///< of all pixels, 1 when there are none
+  [[nodiscard]] double missing_share() const;  ///< share of all pixels; 1 without pixels
 
  private:
   std::vector<float> measured_;

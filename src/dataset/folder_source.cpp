@@ -119,9 +119,9 @@ class FolderSource final : public FrameSource {
   std::string doubt_;
   Layout layout_;
   sensor::Camera camera_;
-  sensor::Pinhole rectified_;  ///< of the images that are given
+  sensor::Pinhole rectified_;  ///< pinhole of the rectified images
   sensor::Rectifier rectifier_;
-  std::unique_ptr<VideoFrames> video_;  ///< which locks itself: frames are read side by side
+  std::unique_ptr<VideoFrames> video_;  ///< thread-safe: frames are read in parallel
 };
 
 }  // namespace

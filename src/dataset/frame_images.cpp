@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 #include <vector>
 
 #include "films/azure_kinect.hpp"
@@ -17,7 +18,7 @@
 namespace plumbline::dataset {
 namespace {
 
-constexpr double kFarthestMedian_m = 50.0;  // of floats that are metres
+constexpr double kFarthestMedian_m = 50.0;  // largest plausible median of depth stored as metres
 
 std::string type_name(const cv::Mat& image) {
   const int bits = image.depth() == CV_8U    ? 8
@@ -30,8 +31,9 @@ std::string type_name(const cv::Mat& image) {
 core::Result<void> check_size(const std::string& file, const cv::Mat& image, const sensor::Pinhole& camera,
                               const char* what) {
   if (image.cols == camera.width && image.rows == camera.height) return {};
-  return core::input_error(fmt::format("{}: the {} image is {}x{}, the camera file says {}x{}", file, what,
-                                       image.cols, image.rows, camera.width, camera.height));
+  return core::input_error(fmt::format(
+      "{}: the {} image is {}x{}, the camera file says {}x{}; give the camera's own file (--camera)", file,
+      what, image.cols, image.rows, camera.width, camera.height));
 }
 
 bool channels_are_equal(const cv::Mat& image) {
@@ -44,11 +46,11 @@ bool channels_are_equal(const cv::Mat& image) {
   return true;
 }
 
-/// The first image of the pairs that can be read; empty when none can.
+/// The first readable image of the pairs and its name; empty if none is readable.
 template <typename Name>
-cv::Mat first_image(const Layout& layout, const Name& name) {
+std::pair<std::string, cv::Mat> first_image(const Layout& layout, const Name& name) {
   for (const PairInfo& pair : layout.pairs) {
-    if (auto image = read_stored(layout, name(pair))) return std::move(*image);
+    if (auto image = read_stored(layout, name(pair))) return {name(pair), std::move(*image)};
   }
   return {};
 }
@@ -68,7 +70,7 @@ std::optional<double> median_of(const cv::Mat& metres) {
 }  // namespace
 
 cv::Mat depth_units(const cv::Mat& metres, double depth_scale) {
-  constexpr double kMostUnits = 65534.0;  // 65535 is none
+  constexpr double kMostUnits = 65534.0;  // 65535 means no measurement
   cv::Mat units(metres.size(), CV_16UC1);
   for (int v = 0; v < metres.rows; ++v) {
     const auto* from = metres.ptr<float>(v);
@@ -96,7 +98,8 @@ core::Result<void> mask_depth(const std::string& mask_file, cv::Mat& depth) {
   auto mask = read_image(mask_file);
   if (!mask) return tl::unexpected(mask.error());
   if (mask->type() != CV_8UC1)
-    return core::input_error(fmt::format("{}: has {}; one of 8 bits is needed", mask_file, type_name(*mask)));
+    return core::input_error(
+        fmt::format("{}: the mask has {}; one channel of 8 bits is needed", mask_file, type_name(*mask)));
   if (mask->size() != depth.size()) cv::resize(*mask, *mask, depth.size(), 0.0, 0.0, cv::INTER_NEAREST);
   depth.setTo(0, *mask == 0);
   return {};
@@ -109,10 +112,12 @@ core::Result<cv::Mat> color_pixels(const std::string& name, cv::Mat image, const
     return core::input_error(
         fmt::format("{}: the colour image has {}; 8 bits are needed", name, type_name(image)));
   }
+
   sensor::Pinhole stored = camera;
   stored.width *= reduction;
   stored.height *= reduction;
   if (auto size = check_size(name, image, stored, "colour"); !size) return tl::unexpected(size.error());
+
   if (reduction > 1) cv::resize(image, image, {camera.width, camera.height}, 0.0, 0.0, cv::INTER_AREA);
   if (deep) image.convertTo(image, CV_8U, 1.0 / 257.0);  // 65535 becomes 255
   if (image.channels() == 1) cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);
@@ -159,10 +164,11 @@ sensor::RgbdFrame rectified_frame(std::size_t index, const PairInfo& pair, const
 }
 
 core::Result<void> check_image_kinds(const Layout& layout, sensor::Camera& camera, core::Log& log) {
-  const cv::Mat color = first_image(layout, [](const PairInfo& pair) { return pair.color_file; });
+  const cv::Mat color = first_image(layout, [](const PairInfo& pair) { return pair.color_file; }).second;
   if (!color.empty() && color.depth() == CV_16U && color.channels() >= 3)
     log.info("the colour images have 16 bits a channel; the upper 8 are used");
-  const cv::Mat depth = first_image(layout, [](const PairInfo& pair) { return pair.depth_file; });
+
+  const auto [depth_file, depth] = first_image(layout, [](const PairInfo& pair) { return pair.depth_file; });
   if (depth.type() == CV_16UC3 && channels_are_equal(depth))
     log.info("the depth images have three equal channels; the first is used");
   if (depth.type() != CV_32FC1 && depth.type() != CV_64FC1) return {};
@@ -174,9 +180,8 @@ core::Result<void> check_image_kinds(const Layout& layout, sensor::Camera& camer
   if (median && *median > kFarthestMedian_m) {
     return core::input_error(
         fmt::format("{}: depth stored as floats is taken as metres, and its median is {:.4g}; store metres "
-                    "(of millimetres: "
-                    "divide by 1000)",
-                    layout.pairs.front().depth_file, *median));
+                    "(divide millimetres by 1000)",
+                    depth_file, *median));
   }
 
   camera.depth_scale = kFloatDepthScale;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The images of a pair, in the kinds that a Rectifier takes: many kinds are stored, few are computed with.
+// The images of a pair, converted from the many stored pixel formats to those that a Rectifier takes.
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <string>
@@ -21,15 +21,15 @@ class VideoFrames;
 /// mm, up to 13.1 m.
 inline constexpr double kFloatDepthScale = 5000.0;
 
-/// The image of a file, of a frame of a video (video_frame_name), of the file that a layout's images are
-/// packed in, or of a bag.
+/// Reads an image from a file, a video (video_frame_name), the file in which a layout's images are packed, or
+/// a bag.
 core::Result<cv::Mat> read_stored(const Layout& layout, const std::string& name,
                                   VideoFrames* video = nullptr);
 
 /// A file's bytes, undecoded. Error (kInput): cannot be read.
 core::Result<StoredImage> stored_file(const std::string& file);
 
-/// Pixels that were read already as read_color and read_depth give them; `name` is for messages.
+/// Converts pixels that were already read into those of read_color and read_depth; `name` is for messages.
 core::Result<cv::Mat> color_pixels(const std::string& name, cv::Mat image, const sensor::Pinhole& camera,
                                    int reduction = 1);
 core::Result<cv::Mat> depth_pixels(const std::string& name, cv::Mat image, const sensor::Pinhole& camera,
@@ -40,26 +40,25 @@ core::Result<cv::Mat> depth_pixels(const std::string& name, cv::Mat image, const
 core::Result<cv::Mat> read_color(const Layout& layout, const std::string& file, const sensor::Pinhole& camera,
                                  VideoFrames* video = nullptr);
 
-/// CV_16UC1 of the camera's size, in units of 1 / depth_scale metres; 0 is no measurement. Images of 16 bits
-/// with one channel are taken as they are, those with three equal channels too; floats are metres and rounded
-/// to units.
+/// CV_16UC1 of the camera's size, in units of 1 / depth_scale metres; 0 means no measurement. Images of 16
+/// bits with one channel are taken as they are, those with three equal channels too; floats are metres and
+/// rounded to units.
 core::Result<cv::Mat> read_depth(const Layout& layout, const std::string& file, const sensor::Pinhole& camera,
                                  double depth_scale);
 
-/// Metres of CV_32FC1 as units of 1 / depth_scale metres; values that are not finite, not positive or too far
-/// become 0.
+/// Converts metres (CV_32FC1) to units of 1 / depth_scale metres; values that are not finite, not positive or
+/// too far become 0.
 cv::Mat depth_units(const cv::Mat& metres, double depth_scale);
 
-/// Takes out of a depth image what a mask of any size, in a file, has 0 for. Error (kInput): no mask.
+/// Clears the pixels of a depth image where the mask in a file, of any size, is 0. Errors (kInput): no mask.
 core::Result<void> mask_depth(const std::string& mask_file, cv::Mat& depth);
 
-/// A pair's images, as read_color and read_depth give them, as a frame without odometry.
+/// Makes a frame without odometry from a pair's images, which are those of read_color and read_depth.
 sensor::RgbdFrame rectified_frame(std::size_t index, const PairInfo& pair, const cv::Mat& color,
                                   const cv::Mat& depth, const sensor::Rectifier& rectifier);
 
-/// Looks at the first images that can be read and says what is unusual about their kind. Where depth is
-/// stored as floats, the camera's depth_scale becomes kFloatDepthScale. Error (kInput): floats that cannot be
-/// metres.
+/// Reports unusual pixel formats of the first readable images to the log. Where depth is stored as floats,
+/// the camera's depth_scale becomes kFloatDepthScale. Error (kInput): floats that cannot be metres.
 core::Result<void> check_image_kinds(const Layout& layout, sensor::Camera& camera, core::Log& log);
 
 }  // namespace plumbline::dataset

@@ -72,7 +72,7 @@ std::unique_ptr<FrameSource> make_folder_source(std::string name, Layout layout,
 
 /// One layout: src/dataset/layouts has a source for each. Of some a recording is a file.
 struct LayoutFormat {
-  const char* name;        ///< of --format
+  const char* name;        ///< value of --format
   const char* program;     ///< program that writes it, for messages
   const char* looked_for;  ///< for messages
   /// Files and folders that must exist; '|' separates alternatives, of which one suffices. A name that ends
@@ -100,16 +100,16 @@ const std::vector<const LayoutFormat*>& layout_formats();
 /// The first that recognises the folder; null when none does.
 const LayoutFormat* layout_of(const std::filesystem::path& folder);
 
-/// Message for a folder that is no recording: its content, and the layout that is nearest.
+/// Message for a folder that is not a recording: its content, and the layout that is nearest.
 std::string not_a_recording(const std::filesystem::path& folder);
-/// Message for a file that is no recording: its kind if that is known, and what to do instead.
+/// Message for a file that is not a recording: its kind if that is known, and what to do instead.
 std::string not_a_recording_file(const std::filesystem::path& file);
 
 /// True if the path is a folder (a file); false if that cannot be determined.
 bool is_folder(const std::filesystem::path& path);
 bool is_file(const std::filesystem::path& path);
 
-/// A JSON file of at most 64 MB; null when it cannot be read or is no JSON.
+/// A JSON file of at most 64 MB; null if it cannot be read or is not JSON.
 nlohmann::json read_json_file(const std::filesystem::path& file);
 /// The number under that key; none if it is missing, not a number or not finite.
 std::optional<double> json_number(const nlohmann::json& object, const char* key);

@@ -138,7 +138,7 @@ class LiveFrames::Store {
 
     const double depth_stamp = frame.depth_stamp.value_or(frame.stamp);
     const std::lock_guard lock(mutex_);
-    if (closed_) return core::input_error("no frame is taken any more: the recording is closed");
+    if (closed_) return core::input_error("the recording is closed and accepts no more frames");
 
     if (!std::isfinite(frame.stamp) || !std::isfinite(depth_stamp))
       return core::input_error(
@@ -359,7 +359,7 @@ class LiveFrames::View final : public FrameSource {
   std::string format_ = "live";
   std::shared_ptr<Store> store_;
   sensor::Camera camera_;
-  sensor::Pinhole rectified_;  ///< of the images that are given
+  sensor::Pinhole rectified_;  ///< pinhole of the rectified images
   sensor::Rectifier rectifier_;
 };
 

@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Searches one level down, because a scene's folder is easily given instead of one of its sequences.
+/// Recordings one level down: a scene's folder is easily given instead of one of its sequences.
 std::string recordings_inside(const fs::path& folder) {
   std::vector<std::string> found;
   std::error_code ignored;
@@ -30,6 +30,7 @@ std::string recordings_inside(const fs::path& folder) {
     const fs::path& path = entry.path();
     if (layout_of(path) != nullptr) found.push_back(path.string());
   }
+
   std::sort(found.begin(), found.end());
   std::string text;
   for (std::size_t i = 0; i < std::min<std::size_t>(found.size(), 3); ++i)
@@ -48,6 +49,7 @@ core::Result<Layout> read_layout(const fs::path& folder, const std::string& form
     return core::usage_error(
         fmt::format("format '{}' is not known (allowed: {})", format, fmt::join(layout_names(), ", ")));
   }
+
   if (const LayoutFormat* found = layout_of(folder)) return found->read(folder, options, log);
   const std::string inside = recordings_inside(folder);
   if (!inside.empty()) {
@@ -57,7 +59,7 @@ core::Result<Layout> read_layout(const fs::path& folder, const std::string& form
   return core::input_error(not_a_recording(folder));
 }
 
-/// Bags are recognised by their content; `--format` is about folders.
+/// Bags are recognised by their content; `--format` applies to folders only.
 core::Result<Layout> read_any(const fs::path& path, const OpenOptions& open, const LayoutOptions& options,
                               core::Log& log) {
   const bool any = open.format.empty() || open.format == "auto";
@@ -71,9 +73,9 @@ core::Result<Layout> read_any(const fs::path& path, const OpenOptions& open, con
 }
 
 /// Rounds stamps to whole nanoseconds, like those of messages, so that copies of a recording have the same
-/// ones.
+/// stamps.
 void round_stamps(std::vector<PairInfo>& pairs) {
-  constexpr double kMost_s = 9e9;  // beyond, nanoseconds do not fit 64 bits
+  constexpr double kMost_s = 9e9;  // above this, nanoseconds do not fit into 64 bits
   for (PairInfo& pair : pairs) {
     for (double* stamp : {&pair.stamp, &pair.depth_stamp}) {
       if (std::abs(*stamp) < kMost_s)
@@ -82,13 +84,14 @@ void round_stamps(std::vector<PairInfo>& pairs) {
   }
 }
 
-/// Keeps only the first of several frames with the same stamp, in the microseconds that trajectories are
-/// written with: their poses could not be distinguished. `pairs` are sorted by stamp.
+/// Keeps only the first of several frames with the same stamp in microseconds, the unit of written
+/// trajectories: their poses could not be distinguished there. `pairs` are sorted by stamp.
 void drop_same_stamps(const std::string& folder, std::vector<PairInfo>& pairs, core::Log& log) {
   const auto microseconds = [](const PairInfo& pair) { return std::llrint(pair.stamp * 1e6); };
   const auto same = [&](const PairInfo& a, const PairInfo& b) { return microseconds(a) == microseconds(b); };
   const auto first = std::adjacent_find(pairs.begin(), pairs.end(), same);
   if (first == pairs.end()) return;
+
   const double stamp = first->stamp;
   const std::string dropped = (first + 1)->color_file;
   const auto end = std::unique(pairs.begin(), pairs.end(), same);
@@ -101,7 +104,7 @@ void drop_same_stamps(const std::string& folder, std::vector<PairInfo>& pairs, c
 core::Result<void> select(const OpenOptions& options, const std::string& folder,
                           std::vector<PairInfo>& pairs) {
   if (options.every < 1) {
-    return core::usage_error(fmt::format("every: {} is not possible (allowed: 1 and more)", options.every));
+    return core::usage_error(fmt::format("every: {} is out of range (allowed: 1 or more)", options.every));
   }
 
   const double start = pairs.front().stamp;
@@ -116,15 +119,15 @@ core::Result<void> select(const OpenOptions& options, const std::string& folder,
 
   if (kept.empty()) {
     return core::usage_error(
-        fmt::format("{}: nothing lies between {} s and {} s: the recording is {:.2f} s long", folder,
-                    options.from_s, options.to_s, duration));
+        fmt::format("{}: nothing lies between {} s and {} s (--from, --to): the recording is {:.2f} s long",
+                    folder, options.from_s, options.to_s, duration));
   }
 
   pairs = std::move(kept);
   return {};
 }
 
-/// A folder's name, a bag's without its endings.
+/// Name of a recording: a folder's name, or a bag's without its extensions.
 std::string name_of(const fs::path& place, const fs::path& given) {
   const fs::path named = place.filename().empty() ? given : place;
   if (is_folder(named)) return named.filename().string();
@@ -158,7 +161,7 @@ core::Result<TrajectoryReading> recording_poses(const fs::path& folder, core::Lo
   for (const geometry::StampedPose& pose : reading.poses) reading.rows.push_back(pose.stamp);
   if (layout->truth_is_odometry) {
     reading.notes.push_back(
-        fmt::format("the {} poses to compare with are those of the recorder's own odometry, no truth",
+        fmt::format("the {} poses to compare with are those of the recorder's own odometry, not ground truth",
                     reading.poses.size()));
   }
 
@@ -200,9 +203,10 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
 
   for (PairInfo& pair : layout->pairs) pair.depth_stamp += camera->depth_delay_s;
 
-  fs::path place = fs::weakly_canonical(folder, ignored);  // "." and "room/" have names too
+  const fs::path place = fs::weakly_canonical(folder, ignored);  // gives "." and "room/" a name
   const std::string name = name_of(place, folder);
   auto source = make_folder_source(name, *layout, *camera);
+
   const auto doubt = check_depth_scale(*source, folder.string());
   if (!doubt) return tl::unexpected(doubt.error());
   if (doubt->empty()) return source;

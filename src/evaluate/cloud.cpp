@@ -32,7 +32,7 @@ constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
 /// The reference in all its forms.
 struct Truth {
-  std::unique_ptr<PointIndex> index;  ///< of samples; null for a mesh
+  std::unique_ptr<PointIndex> index;  ///< index of the samples; null for a mesh
   std::unique_ptr<MeasuredSurface> surface;
   SurfaceSamples counted;  ///< samples at which completeness is measured
   std::size_t hidden = 0;

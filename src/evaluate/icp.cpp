@@ -21,7 +21,7 @@ constexpr double kStill = 1e-7;       // m; a smaller step ends the search
 constexpr double kLeastStiffness = 1e-4;
 
 struct Pair {
-  Eigen::Vector3d point;  ///< of the cloud, moved
+  Eigen::Vector3d point;  ///< point of the cloud, transformed
   Eigen::Vector3d normal;
   double residual = 0.0;  ///< normal . (point - foot)
   double distance = 0.0;

@@ -7,7 +7,7 @@
 
 namespace plumbline::evaluate {
 namespace {
-constexpr double kLeastSeparation = 1e-4;  // m; rounding of coordinates is no layer
+constexpr double kLeastSeparation = 1e-4;  // m; above the rounding of coordinates
 
 double spread(std::vector<double>::const_iterator first, std::vector<double>::const_iterator last) {
   const auto n = static_cast<double>(last - first);

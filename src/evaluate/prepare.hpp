@@ -19,7 +19,7 @@ core::Result<void> check(const Reference& reference);
 /// Finite points of a cloud; normals unit or zero, all left out if none is usable.
 struct PreparedCloud {
   std::unique_ptr<SurfaceSamples> samples;
-  std::unique_ptr<PointIndex> index;  ///< of samples->points
+  std::unique_ptr<PointIndex> index;  ///< index of samples->points
   std::vector<std::uint32_t> source;  ///< number of each point in the cloud as given
   Density density;
 };

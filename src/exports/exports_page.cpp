@@ -19,6 +19,7 @@ constexpr const char* kExportsIntroduction = R"(# Exports
 `map.db` of a run (of an interrupted one, too), a fused map of several robots, or, where a cloud is enough, any
 PLY or PCD file. A folder below `components/` holds a map that did not join the rest of its run; it can be exported to the formats
 that need no `map.db`.
+
 The format follows from the ending of the output, or from `--format`.
 
 ```sh
@@ -124,8 +125,7 @@ std::string exports_page() {
 
   page +=
       "\nFormats with the same ending are selected by `--what trajectory|keyframes|lines` and `--mesh`. "
-      "There is "
-      "no E57, because no library in Debian writes it; CloudCompare converts PLY and LAS to E57.\n";
+      "There is no E57, because no library in Debian writes it; CloudCompare converts PLY and LAS to E57.\n";
   page += kExportsFrame;
   page += fmt::format(
       "## Options\n\n{} work with every format, the others with those that list them below. In "

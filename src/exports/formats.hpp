@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The table of formats. A format is one file that gives one of these.
+// The table of formats. Each format is one source file with one function that returns its entry.
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -13,24 +13,24 @@ namespace plumbline::exports {
 
 struct Format {
   std::string name;
-  std::vector<std::string> endings;  ///< of the output's name; the longest that fits wins. Empty: a folder
-  std::vector<Content> contents;     ///< that it can hold; the first one is the default
-  std::string needs;                 ///< besides a map: "map.db", "recording"; empty: a cloud does
+  std::vector<std::string> endings;  ///< file name endings, the longest match decides; empty: a folder
+  std::vector<Content> contents;     ///< possible contents, the default first
+  std::string needs;                 ///< "map.db" or "recording" besides a map; empty: a cloud is enough
   std::string title;
   std::string description;           ///< Markdown
-  std::vector<std::string> options;  ///< keys of ExportOptions, besides those that all take
+  std::vector<std::string> options;  ///< keys of ExportOptions besides common_options()
   core::Result<ExportSummary> (*write)(MapSource& source, const std::filesystem::path& output);
 };
 
-/// Says so if a cloud has no colour: these formats cannot leave it out.
+/// Adds a note if the cloud has no colour; for formats that cannot leave colour out.
 void note_colorless(const cloud::CloudFile& file, ExportSummary& summary);
 
-/// By what users need most.
+/// All formats, those needed most first.
 const std::vector<Format>& formats();
 /// Options that all formats take.
 const std::vector<std::string>& common_options();
 
-// One a file, in this folder's subfolders.
+// One per source file, in this folder's subfolders.
 Format colmap_format();
 Format nerfstudio_format();
 Format grid_format();

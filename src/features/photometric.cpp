@@ -21,12 +21,12 @@ constexpr float kHalo = 0.5F + 2 * (kBox / 2);  // reach of two such boxes
 
 /// Full pixels of a depth image around one of a level.
 struct Surroundings {
-  int near_px;  ///< whose depth is averaged
-  int far_px;   ///< that the local mean took grey values from
+  int near_px;  ///< radius within which depth is averaged
+  int far_px;   ///< radius from which the local mean takes grey values
 };
 
-/// Depth at a pixel, the mean over the surface near it; 0 where it is missing or jumps around it: what the
-/// image holds of another surface, if only in the local mean, moves with that.
+/// Mean depth of the surface near a pixel; 0 where depth is missing or jumps nearby, because grey values of
+/// another surface, even in the local mean, move with that surface.
 float continuous_depth(const cv::Mat& depth, int x, int y, const Surroundings& around) {
   const float here = depth.at<float>(y, x);
   if (!(here > kNearestSample_m)) return 0.0F;

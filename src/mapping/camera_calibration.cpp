@@ -38,17 +38,17 @@ constexpr int kLeastObservations = 300;
 
 using Parts = std::array<CalibrationProblem, kParts>;
 
-/// A picture that takes part: a keyframe, or a frame with stored observations.
+/// A picture used for calibration: a keyframe, or a frame with stored observations.
 struct View {
   double stamp = 0.0;
   Rigid3 camera_from_world;
-  core::KeyframeId root;  ///< of its component
+  core::KeyframeId root;  ///< root of its component
   std::vector<std::pair<core::PointId, CalibrationObservation>> seen;
-  /// By so much longer than was believed when it was read is the depth's delay known now.
+  /// Present estimate of the depth's delay minus the one with which the picture was read, seconds.
   double late_s = 0.0;
 };
 
-/// Some of many, spread evenly.
+/// A subset of a list, spread evenly.
 template <typename Thing>
 std::vector<Thing> thinned(const std::vector<Thing>& all, std::size_t most) {
   if (all.size() <= most) return all;
@@ -337,7 +337,7 @@ class Calibrator {
     });
   }
 
-  /// Without a gain: that of before stays.
+  /// Records the estimates of a group; without `gain` the earlier gain is kept.
   void note(const Group& group, const CameraChange& change, const CameraChange& sigma,
             std::optional<double> gain, bool used, std::vector<CameraFinding>& findings) const {
     const std::vector<CameraNumber> found = numbers_of(optimize::changed_camera(given_, change));

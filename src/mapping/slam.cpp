@@ -33,24 +33,24 @@ constexpr std::int64_t kConnectAfter = 2;
 /// Frames in a row that are lost before a new component begins: half a second of a common camera.
 constexpr int kLostFrames = 15;
 
-/// A map's first frame must have depth to make landmarks and surfaces of: on a covered camera's nothing, all
-/// that follows would be lost.
+/// True if a frame may start a map: it must have depth for landmarks and surfaces. If the camera was covered,
+/// all later frames would be lost.
 static bool can_start_map(const sensor::RgbdFrame& frame) {
   constexpr double kMinMeasured = 0.05;  // share of the pixels
   return !frame.depth.empty() &&
          cv::countNonZero(frame.depth > 0) > kMinMeasured * static_cast<double>(frame.depth.total());
 }
 
-/// A frame that is about to be lost, in a turn that is too fast, has a pose that is known to centimetres
-/// only: it is as good as lost. Where nothing but the motion model holds a direction there is no better pose.
-static bool is_well_held(const tracking::TrackResult& track) {
+/// True if the pose is accurate enough. In a turn that is too fast it is known to centimetres only: such a
+/// frame is as good as lost. If only the motion model constrains a direction, no better pose can be had.
+static bool is_accurate(const tracking::TrackResult& track) {
   constexpr double kLeast = 1e4;  // a standard deviation of 1 cm in the weakest direction
   const bool is_first = track.min_eigenvalue == 0.0;
   return is_first || track.degenerate_directions > 0 || track.min_eigenvalue >= kLeast;
 }
 
-/// A frame that begins a component must show what the next ones can be tracked by: not the dark, a hand or a
-/// bare wall.
+/// True if a frame may begin a component: it must show enough to track the next ones, so not the dark, a hand
+/// or a bare wall.
 static bool can_begin_component(const sensor::RgbdFrame& frame, const features::FrameFeatures& features) {
   constexpr std::ptrdiff_t kLeastLandmarks = 60;  // points and lines (twice) with depth
   const auto points = std::count_if(features.points.begin(), features.points.end(),
@@ -143,7 +143,7 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& featur
   last_track_ = tracker_.track(map_, frame, features);
   const bool believed = believes_place(frame, features, lost_before);
   const bool tracked = last_track_.state == tracking::TrackState::kTracked;
-  if (!believed || (tracked && !is_well_held(last_track_))) last_track_.state = tracking::TrackState::kLost;
+  if (!believed || (tracked && !is_accurate(last_track_))) last_track_.state = tracking::TrackState::kLost;
   const tracking::TrackResult& track = last_track_;
 
   if (tracker_.astray()) {
@@ -371,7 +371,7 @@ void Slam::join_components(core::KeyframeId keyframe) {
   if (!overlap) return;
   commit_bundles();
 
-  // Laid over each other, connected by the pair of keyframes that share most, and adjusted together.
+  // The components are aligned, connected by the pair of keyframes that share most, and adjusted together.
   maps::Map map = map_;
   const std::size_t joining = maps::component(map, overlap->b).keyframe_count();
   maps::move_component(map, overlap->b, overlap->evidence.alignment.a_from_b);

@@ -22,12 +22,17 @@ core::Result<void> warn_of_security(const NetworkOptions& options, const std::st
       log.warning(fmt::format("no --security on interface {}: {}", options.interface, danger));
     return {};
   }
-  constexpr int kSoon = 30;
+
+  constexpr int kSoon = 30;  // days
   return core::part<BusPart>()
       .and_then([&](const BusPart* part) { return part->days_left(options.security); })
       .map([&](int days) {
-        if (days < kSoon)
-          log.warning(fmt::format("the keys in {} expire in {} days", options.security.string(), days));
+        const std::string keys = options.security.string();
+        if (days < 0) {
+          log.warning(fmt::format("the keys in {} have expired; make new ones: plumbline keys", keys));
+        } else if (days < kSoon) {
+          log.warning(fmt::format("the keys in {} expire in {} days", keys, days));
+        }
       });
 }
 

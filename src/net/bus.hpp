@@ -54,7 +54,7 @@ struct SharedFrame {
   std::array<double, 21> covariance{};
 };
 
-/// The hub's identity and its content of one robot's store.
+/// The hub's identity and the state of its copy of one robot's store.
 struct HubStatus {
   std::uint32_t protocol = kProtocol;
   std::uint32_t store_format = 0;
@@ -103,9 +103,10 @@ class RobotBus {
   virtual std::vector<HubStatus> poll_hub() = 0;  ///< statuses addressed to other robots included
   /// Chunks of other robots' maps; the hub sends them from the first call on.
   virtual std::vector<Chunk> poll_feedback() = 0;
-  [[nodiscard]] virtual bool has_reader() = 0;    ///< a hub subscribes to this robot's chunks
-  [[nodiscard]] virtual bool all_received() = 0;  ///< every subscriber has acknowledged all sent chunks
-  [[nodiscard]] virtual int participants() = 0;   ///< others on the network, of any kind
+  [[nodiscard]] virtual bool has_reader() = 0;  ///< true if a hub subscribes to this robot's chunks
+  /// True if every subscriber has acknowledged all sent chunks.
+  [[nodiscard]] virtual bool all_received() = 0;
+  [[nodiscard]] virtual int participants() = 0;  ///< number of others on the network, of any kind
   virtual void wait(std::chrono::milliseconds most) = 0;
 };
 
@@ -115,14 +116,14 @@ struct ReceivedStatus {
   std::string partition;
 };
 
-/// The hub's side of the transport. Threads and blocking as RobotBus.
+/// The hub's side of the transport. Thread safety and blocking as RobotBus.
 class HubBus {
  public:
   virtual ~HubBus() = default;
   virtual void publish(const HubStatus& status) = 0;
   virtual std::vector<ReceivedStatus> poll_robots() = 0;
   virtual std::vector<HubStatus> poll_hubs() = 0;  ///< this hub's own included
-  /// Chunks of this robot are received from now on.
+  /// Subscribes to the chunks of this robot.
   virtual core::Result<void> subscribe(const std::string& robot) = 0;
   virtual std::vector<Chunk> receive(const std::string& robot, int most) = 0;
   /// Number of times that this robot has subscribed to feedback; 0 if it is not subscribed now. Chunks sent
@@ -142,7 +143,7 @@ struct BusPart {
   core::Result<std::unique_ptr<RobotBus>> (*open_robot)(const NetworkOptions& options,
                                                         const std::string& name, const BusLog& log);
   core::Result<std::unique_ptr<HubBus>> (*open_hub)(const NetworkOptions& options, const BusLog& log);
-  // keys.hpp of the part
+  // Functions of the part's keys.hpp.
   core::Result<void> (*make_authority)(const std::filesystem::path& folder);
   core::Result<void> (*make_keys)(const std::filesystem::path& folder, const std::string& name);
   core::Result<void> (*revoke)(const std::filesystem::path& folder, const std::vector<std::string>& names);

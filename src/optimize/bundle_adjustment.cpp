@@ -21,7 +21,7 @@ void write_back(const BundleState& state, BundleProblem& problem) {
     problem.lines[i] = geometry::to_plucker(state.lines[i]);
 }
 
-/// Sums of squares by and by.
+/// Collects the squared errors of observations that fit.
 class FitSum {
  public:
   void add(double squared, bool fits) {
@@ -30,7 +30,7 @@ class FitSum {
     ++fit_.fitting;
     sum_ += squared;
   }
-  /// Fit if each square is that of `coordinates` coordinates.
+  /// The fit; each squared error has `coordinates` coordinates.
   [[nodiscard]] BundleFit fit(int coordinates) const {
     BundleFit fit = fit_;
     if (fit.fitting > 0) fit.rms = std::sqrt(sum_ / (coordinates * static_cast<double>(fit.fitting)));
@@ -42,7 +42,8 @@ class FitSum {
   double sum_ = 0.0;
 };
 
-/// Least first gate, pixels: corners and lines known to a tenth of a pixel need not wait for a third of one.
+/// Smallest first gate, pixels: corners and lines known to a tenth of a pixel are not excluded for a third of
+/// one.
 constexpr double kLeastFirstGate_px = 0.8;
 
 /// Rejects as an outlier what exceeds a gate of squared standard deviations and `least_px`.
@@ -88,7 +89,7 @@ class Gate {
  private:
   using Rigid3 = geometry::Rigid3;
   static constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  /// True beyond the gate, and if it is not a number.
+  /// True if an error is beyond the gate or not a number.
   [[nodiscard]] bool beyond(double squared, double gate, double pixel_sigma) const {
     return !(squared <= std::max(gate, least_px2_ / (pixel_sigma * pixel_sigma)));
   }
@@ -128,7 +129,7 @@ BundleFits mark_outliers(BundleProblem& problem, const BundleState& state, const
   return {points.fit(2), lines.fit(2), fit_of_edges(problem, state)};
 }
 
-/// Rounds, and between them what does not fit is put aside.
+/// Solves in rounds; between them, observations that do not fit are marked as outliers.
 template <typename SolveRound>
 BundleSummary adjust(BundleProblem& problem, const BundleOptions& options, const SolveRound& solve_round) {
   BundleSummary summary;

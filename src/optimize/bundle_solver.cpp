@@ -24,7 +24,7 @@ void TrustRegion::reject() {
   shrink_ *= 2.0;
 }
 
-/// By how much the linearised cost falls: -g.d / 2 + d.D d / 2, since (H + D) d = -g.
+/// Decrease of the linearised cost: -g.d / 2 + d.D d / 2, since (H + D) d = -g.
 double BundleRound::model_decrease(double radius) const {
   double gradient = 0.0;
   double damped = 0.0;
@@ -60,7 +60,7 @@ void BundleRound::step(const BundleState& from, BundleState& to) const {
   }
 }
 
-/// Nothing moves by more than rounding does.
+/// True if the step is no larger than rounding errors.
 bool BundleRound::tiny_step(const BundleState& state) const {
   constexpr double kShare = 1e-7;
   double moved = reduced_.squared_pose_steps();
@@ -82,7 +82,7 @@ std::vector<Matrix6d> BundleRound::covariances(const BundleState& state) {
   return result;
 }
 
-/// One step; why it was the last one, or null.
+/// Makes one step; returns the reason if it was the last one, else null.
 const char* BundleRound::iterate(TrustRegion& region, BundleState& state, BundleState& next,
                                  RoundSummary& summary) {
   constexpr double kGradientTolerance = 1e-10;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Poses and lines as Ceres' parameter blocks, how they are updated, and the residuals of pose_terms and
-// bundle_terms as Ceres' cost functions. These give their derivatives by the local coordinates, in the first
-// columns of the ambient Jacobian; PlusJacobian = [I; 0] hands them on.
+// Poses and lines as parameter blocks of Ceres, their manifolds, and the residuals of pose_terms and
+// bundle_terms as cost functions of Ceres. Cost functions put their derivatives by the local coordinates into
+// the first columns of the ambient Jacobian; PlusJacobian = [I; 0] selects these.
 #include <ceres/manifold.h>
 #include <ceres/problem.h>
 #include <ceres/sized_cost_function.h>
@@ -23,9 +23,9 @@ inline ceres::Problem::Options borrowing() {
   return options;
 }
 
-/// Quaternion x y z w, translation: camera_from_world.
+/// Size of camera_from_world as a block: quaternion x y z w, translation.
 constexpr int kPoseBlock = 7;
-/// Quaternion x y z w of U, then w1 w2: an orthonormal line.
+/// Size of an orthonormal line as a block: quaternion x y z w of U, then w1 w2.
 constexpr int kLineBlock = 6;
 
 inline geometry::Rigid3 to_rigid(const double* block) {
@@ -57,12 +57,12 @@ class LiftedManifold : public ceres::Manifold {
     Eigen::Map<Eigen::Matrix<double, kAmbient, kTangent, Eigen::RowMajor>>(jacobian).setIdentity();
     return true;
   }
-  // Not used by the solvers that minimise; the lifted Jacobians have no meaning here.
+  // Ceres' minimisers do not call these, and lifted Jacobians do not define them.
   bool Minus(const double* /*y*/, const double* /*x*/, double* /*y_minus_x*/) const override { return false; }
   bool MinusJacobian(const double* /*x*/, double* /*jacobian*/) const override { return false; }
 };
 
-/// T <- Exp(delta) T.
+/// Update of a pose: T <- Exp(delta) T.
 class PoseManifold : public LiftedManifold<kPoseBlock, 6> {
  public:
   bool Plus(const double* x, const double* delta, double* x_plus_delta) const override {
@@ -72,7 +72,7 @@ class PoseManifold : public LiftedManifold<kPoseBlock, 6> {
   }
 };
 
-/// U <- U Exp(theta), W <- W R(phi).
+/// Update of a line: U <- U Exp(theta), W <- W R(phi).
 class LineManifold : public LiftedManifold<kLineBlock, 4> {
  public:
   bool Plus(const double* x, const double* delta, double* x_plus_delta) const override {
@@ -81,7 +81,7 @@ class LineManifold : public LiftedManifold<kLineBlock, 4> {
   }
 };
 
-/// Into the first columns of an ambient Jacobian, if that is wanted.
+/// Copies a local Jacobian into the first columns of an ambient one, unless that is null.
 template <int kAmbient, int kRows, int kTangent>
 void lift(const Eigen::Matrix<double, kRows, kTangent>& local, double* jacobian) {
   if (jacobian == nullptr) return;
@@ -90,7 +90,7 @@ void lift(const Eigen::Matrix<double, kRows, kTangent>& local, double* jacobian)
   j.template rightCols<kAmbient - kTangent>().setZero();
 }
 
-/// point_residual; the third row is 0 without depth. Like the others it fails where the result is no number.
+/// Cost of point_residual; the third row is 0 without depth. All costs fail if the result is not finite.
 class PointCost : public ceres::SizedCostFunction<3, kPoseBlock, 3> {
  public:
   PointCost(const BundlePointObservation& seen, const sensor::Pinhole& camera)
@@ -100,12 +100,14 @@ class PointCost : public ceres::SizedCostFunction<3, kPoseBlock, 3> {
     const geometry::Rigid3 pose = to_rigid(parameters[0]);
     PointTerm term = term_;
     term.world = Eigen::Vector3d(parameters[1]);
+
     Eigen::Vector3d r;
     Eigen::Matrix<double, 3, 6> j;
     if (point_residual(term, pose, camera_, r, jacobians != nullptr ? &j : nullptr) == 0) {
       r << std::sqrt(kBehind), 0.0, 0.0;
       j.setZero();
     }
+
     std::copy_n(r.data(), 3, residuals);
     if (jacobians == nullptr) return r.allFinite();
     lift<kPoseBlock>(j, jacobians[0]);
@@ -119,7 +121,7 @@ class PointCost : public ceres::SizedCostFunction<3, kPoseBlock, 3> {
   const sensor::Pinhole& camera_;
 };
 
-/// line_rows.
+/// Cost of line_rows.
 class LineCost : public ceres::SizedCostFunction<4, kPoseBlock, kLineBlock> {
  public:
   LineCost(const BundleLineObservation& seen, const sensor::Pinhole& camera)
@@ -142,7 +144,7 @@ class LineCost : public ceres::SizedCostFunction<4, kPoseBlock, kLineBlock> {
   Eigen::Matrix3d projection_;
 };
 
-/// edge_rows.
+/// Cost of edge_rows.
 class EdgeCost : public ceres::SizedCostFunction<6, kPoseBlock, kPoseBlock> {
  public:
   explicit EdgeCost(const BundleEdge& edge) : view_(edge) {}

@@ -45,7 +45,7 @@ struct View {
   float t[3];
 };
 
-/// Eight at a time. The default clone takes two registers for each.
+/// Vectors of eight numbers. The default clone uses two registers for each.
 using Floats = float __attribute__((vector_size(32)));
 using Integers = std::int32_t __attribute__((vector_size(32)));
 constexpr std::size_t kLanes = sizeof(Floats) / sizeof(float);
@@ -55,7 +55,7 @@ static_assert(kBlock % kLanes == 0);
 struct Places {
   alignas(32) float x[kBlock], y[kBlock], z[kBlock];  // of the points
   alignas(32) std::int32_t pixel[kBlock];
-  alignas(32) float right[kBlock], down[kBlock];  // from that pixel, fractions
+  alignas(32) float right[kBlock], down[kBlock];  // offsets from that pixel, fractions
 };
 
 /// Bilinear grey values where the image shows `count` terms, at most a block; NaN: not in the image.

@@ -30,13 +30,13 @@ Robust huber(double squared, double threshold) {
   return {threshold * (error - 0.5 * threshold), threshold / error};
 }
 
-/// Residual of a term without an image at a pose, standard deviations: moving it behind the camera must not
-/// pay.
+/// Residual of a landmark that does not project into the image at a pose, standard deviations: moving it
+/// behind the camera must not lower the cost.
 constexpr double kUnseen = 1e3;
 
-/// Levenberg-Marquardt damping, alike in all directions of a block. Marquardt's own scaling by each diagonal
-/// entry would be blind to weak directions: with one wall in view, moving along it by d / sin(tilt) does for
-/// the wall what moving towards it by d does, and would be damped no more.
+/// Levenberg-Marquardt damping, the same for all directions of a block. Marquardt's scaling by each diagonal
+/// entry would hardly damp weak directions: with one wall in view, moving along it by d / sin(tilt) changes
+/// the distance to the wall as much as moving towards it by d.
 Vector6d damping(const Matrix6d& h, double lambda) {
   Vector6d d;
   d.head<3>().setConstant(lambda * h.diagonal().head<3>().maxCoeff() + 1e-9);
@@ -44,11 +44,12 @@ Vector6d damping(const Matrix6d& h, double lambda) {
   return d;
 }
 
-/// Lower triangle of the sums of w j^T j and w j^T r, each row padded to whole vectors: more products than
-/// needed, but no odd ones. Every entry is summed in the order of the terms.
+/// Lower triangle of the sums of w j^T j and w j^T r, each row padded to whole SIMD vectors, at the
+/// price of more products than needed. Every entry is summed in the order of the terms.
 struct RowSums {
   alignas(32) double h[6][8] = {};
   alignas(32) double g[8] = {};
+
   void add(const Row6& j, double r, double w) {
     alignas(32) const double row[8] = {j(0), j(1), j(2), j(3), j(4), j(5), 0.0, 0.0};
     for (int a = 0; a < 4; ++a) {
@@ -61,6 +62,7 @@ struct RowSums {
     }
     for (int a = 0; a < 6; ++a) g[a] += (w * row[a]) * r;
   }
+
   void move_to(NormalEquations& n) const {
     for (int a = 0; a < 6; ++a) {
       for (int b = 0; b <= a; ++b) n.h(a, b) = h[a][b];
@@ -69,7 +71,7 @@ struct RowSums {
   }
 };
 
-/// Reprojection and depth: e_p of the paper's section 3.2.
+/// Adds reprojection and depth errors of points: e_p of the paper's section 3.2.
 void add_points(const PoseProblem& problem, const Rigid3& pose, const PoseSolverOptions& options,
                 RowSums& sums, double& cost) {
   Eigen::Vector3d r;
@@ -90,12 +92,12 @@ void add_points(const PoseProblem& problem, const Rigid3& pose, const PoseSolver
     const Robust depth = huber(r(2) * r(2), options.plane_loss);
     cost += options.point_weight * depth.cost;
 
-    // The depth of a corner counts only as far as its pixel fits.
+    // The depth of a corner has the robust weight of its pixel, too.
     sums.add(j.row(2), r(2), options.point_weight * depth.weight * pixel.weight);
   }
 }
 
-/// Measured ends from the projected line: e_l of section 3.2.
+/// Adds distances of measured ends from the projected lines: e_l of section 3.2.
 void add_lines(const PoseProblem& problem, const Rigid3& pose, const PoseSolverOptions& options,
                RowSums& sums, double& cost) {
   const Eigen::Matrix3d projection =
@@ -107,6 +109,7 @@ void add_lines(const PoseProblem& problem, const Rigid3& pose, const PoseSolverO
       cost += options.line_weight * huber(kUnseen * kUnseen, options.line_loss).cost;
       continue;
     }
+
     const Robust robust = huber(r.squaredNorm(), options.line_loss);
     cost += options.line_weight * robust.cost;
     sums.add(j.row(0), r(0), options.line_weight * robust.weight);
@@ -114,7 +117,7 @@ void add_lines(const PoseProblem& problem, const Rigid3& pose, const PoseSolverO
   }
 }
 
-/// Point to plane (docs/method/least_squares.md).
+/// Adds point-to-plane distances (docs/method/least_squares.md).
 void add_planes(const PoseProblem& problem, const Rigid3& pose, const PoseSolverOptions& options,
                 RowSums& sums, double& cost) {
   Row6 j;
@@ -133,6 +136,7 @@ NormalEquations evaluate(const PoseProblem& problem, const Rigid3& pose, const P
   add_lines(problem, pose, options, sums, n.cost);
   add_planes(problem, pose, options, sums, n.cost);
   sums.move_to(n);
+
   if (problem.photometric) {
     const PhotometricSums seen = sum_photometric(*problem.photometric, pose, options.photometric_loss);
     n.h += options.photometric_weight * seen.h;
@@ -142,7 +146,8 @@ NormalEquations evaluate(const PoseProblem& problem, const Rigid3& pose, const P
   return n;
 }
 
-/// The prior's cost; the derivative of log(Exp(xi) T M^-1) by xi is taken as identity (small differences).
+/// Adds the prior's cost; the derivative of log(Exp(xi) T M^-1) by xi is taken as identity (small
+/// differences).
 void add_prior(const PoseProblem& problem, const Rigid3& pose, NormalEquations& n) {
   if (!problem.prior) return;
   const Vector6d e = geometry::log_se3(pose * problem.prior->camera_from_world.inverse());
@@ -203,8 +208,8 @@ PoseSummary solve_pose(const PoseProblem& problem, const Rigid3& camera_from_wor
   summary.information = n.h;
   add_prior(problem, pose, n);
   summary.initial_cost = n.cost;
-  double lambda = 1e-5;
 
+  double lambda = 1e-5;
   for (; summary.iterations < options.max_iterations && !summary.converged; ++summary.iterations) {
     Matrix6d damped = n.h.selfadjointView<Eigen::Lower>();
     damped.diagonal() += damping(n.h, lambda);

@@ -91,13 +91,15 @@ Word Vocabulary::add_children(Word parent, const std::vector<Descriptor256>& cen
 }
 
 std::vector<Word> Vocabulary::divide(Word word, const std::vector<Descriptor256>& members) {
-  if (!overfull(word)) throw std::logic_error("Vocabulary: this word is not to be divided");
+  if (!overfull(word)) throw std::logic_error("Vocabulary: this word is not overfull");
+
   const Clusters clusters =
       k_majority(members, options_.branching, options_.iterations, static_cast<std::uint64_t>(word));
   if (clusters.centres.size() < 2) {
     nodes_[index_of(word)].divide_at = 2 * nodes_[index_of(word)].features;
     return {};
   }
+
   const Word first = add_children(word, clusters.centres);
   std::vector<Word> words;
   words.reserve(members.size());

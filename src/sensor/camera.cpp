@@ -17,7 +17,7 @@ namespace {
 using core::ConfigNode;
 using core::ConfigProblems;
 
-constexpr double kRigidTolerance = 1e-3;  // of R^T R against identity: calibration files are often rounded
+constexpr double kRigidTolerance = 1e-3;  // largest element of R^T R - I: calibration files are often rounded
 
 std::string join(const std::string& path, const std::string& key) {
   return path.empty() ? key : path + "." + key;
@@ -61,7 +61,7 @@ std::optional<double> number_of(const ConfigNode& node) {
   return value;
 }
 
-/// 4 lists of 4 numbers or 16 numbers, row by row.
+/// Reads 4 lists of 4 numbers or 16 numbers, row by row.
 std::optional<Eigen::Matrix4d> read_matrix(const ConfigNode& node) {
   std::vector<const ConfigNode*> cells;
   for (const ConfigNode& item : node.items) {
@@ -72,6 +72,7 @@ std::optional<Eigen::Matrix4d> read_matrix(const ConfigNode& node) {
     }
   }
   if (cells.size() != 16) return std::nullopt;
+
   Eigen::Matrix4d matrix;
   for (std::size_t i = 0; i < 16; ++i) {
     const std::optional<double> value = number_of(*cells[i]);
@@ -89,6 +90,7 @@ void read_color_from_depth(const ConfigNode& node, Camera& camera, ConfigProblem
         {node.mark, path, "is not a 4x4 matrix (allowed: four lists of four numbers, or 16 numbers)"});
     return;
   }
+
   const Eigen::Matrix3d r = matrix->topLeftCorner<3, 3>();
   const double error = (r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   const bool last_row = (matrix->row(3) - Eigen::RowVector4d(0, 0, 0, 1)).cwiseAbs().maxCoeff() < 1e-9;
@@ -100,7 +102,7 @@ void read_color_from_depth(const ConfigNode& node, Camera& camera, ConfigProblem
   camera.color_from_depth = geometry::Rigid3(Eigen::Quaterniond(r), matrix->topRightCorner<3, 1>());
 }
 
-/// The lens of an image: its model and coefficients, as they stand in the file.
+/// The model and coefficients of an image's lens, as in the file.
 struct LensKeys {
   std::string model = "pinhole";
   std::vector<double> distortion = {0.0, 0.0, 0.0, 0.0, 0.0};
@@ -119,12 +121,12 @@ Lens LensKeys::lens(const ConfigNode& map, const std::string& path, ConfigProble
   const bool pinhole = lens.model == LensModel::kRadialTangential;
   const std::size_t n = distortion.size();
   const ConfigNode* node = map.find("distortion");
-  const bool zeros = node == nullptr;  // the default, which is shorter for a fisheye
+  const bool zeros = node == nullptr;  // without the key: the default list is longer than a fisheye's
   if (!zeros && !(pinhole ? (n >= 1 && n <= 5) || n == 8 : n >= 1 && n <= 4)) {
     problems.push_back({node->mark, join(path, "distortion"),
                         fmt::format("has {} numbers (allowed: {})", n,
-                                    pinhole ? "[k1, k2, p1, p2, k3] and [k1, k2, p1, p2, k3, k4, k5, k6]"
-                                            : "[k1, k2, k3, k4]")});
+                                    pinhole ? "1 to 5 of k1, k2, p1, p2, k3, or 8 with k4, k5, k6"
+                                            : "1 to 4 of k1, k2, k3, k4")});
     return lens;
   }
   if (!zeros) std::copy(distortion.begin(), distortion.end(), lens.k.begin());
@@ -157,15 +159,15 @@ void read_depth_camera(const ConfigNode& root, Camera& camera, ConfigProblems& p
   LensKeys lens;
   core::OptionTable table;
   declare_pinhole(table, pinhole);
-
   lens.declare(table);
+
   table.set_all(*depth, "depth", problems);
   check_pinhole(*depth, pinhole, "depth", problems);
   camera.depth = pinhole;
   camera.depth_lens = lens.lens(*depth, "depth", problems);
 }
 
-/// Quoted where YAML needs it.
+/// Text as YAML, quoted where needed.
 std::string text_yaml(std::string text) {
   core::OptionTable table;
   table.text("text", text, "");
@@ -178,7 +180,7 @@ std::string pinhole_yaml(const Pinhole& p, const std::string& indent) {
                      indent, p.width, p.height, p.fx, p.fy, p.cx, p.cy);
 }
 
-/// Model and coefficients, as few of these as there are.
+/// The coefficients of a lens: those that its model has, without unused ones.
 std::string lens_yaml(const Lens& lens, const std::string& indent) {
   const bool pinhole = lens.model == LensModel::kRadialTangential;
   const bool rational = pinhole && (lens.k[5] != 0.0 || lens.k[6] != 0.0 || lens.k[7] != 0.0);

@@ -92,8 +92,8 @@ Eigen::Vector3d Recalibration::point(const Eigen::Vector3d& p) const {
   return z > 0.0 ? image.unproject(now.x(), now.y(), z) : p;
 }
 
-/// On a plane normal . p = d the inverse depth is linear in the ray, 1/z = normal . (x, y, 1) / d: what a
-/// slope adds to the one it adds to the other.
+/// On a plane normal . p = d the inverse depth is linear in the ray, 1/z = normal . (x, y, 1) / d, so that
+/// a slope added to 1/z is added to normal / d.
 Eigen::Vector3d Recalibration::normal(const Eigen::Vector3d& p, const Eigen::Vector3d& normal) const {
   const double d = normal.dot(p);
   if (!moves_depth_ || std::abs(d) < 1e-3) return normal;

@@ -47,7 +47,7 @@ void correct_slope(const Pinhole& camera, const std::array<double, 2>& slope, cv
 /// Area of another image that a depth pixel covers: a rectangle of a plane.
 struct DepthPatch {
   Eigen::Vector2d centre;  ///< pixels
-  Eigen::Vector2d half;    ///< of its sides, pixels
+  Eigen::Vector2d half;    ///< half the length of its sides, pixels
   double z = 0.0;          ///< metres, at the centre
   /// Relative change of the inverse depth a pixel, which is the same all over a plane.
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();
@@ -110,7 +110,7 @@ struct Rectifier::Maps {
   cv::Mat fixed_xy;                   ///< CV_16SC2, whole part of the source pixel
   cv::Mat fixed_fraction;             ///< CV_16UC1, index into OpenCV's table of bilinear weights
   std::vector<std::int32_t> nearest;  ///< source pixel of every target pixel, -1 outside
-  std::vector<LensRay> depth_rays;    ///< of every depth pixel, where a lens bends them
+  std::vector<LensRay> depth_rays;    ///< rays of all depth pixels, if the lens distorts
 
   Maps(const Camera& c, const Pinhole& t) : camera(c), target(t) {
     if (camera.color_from_depth && camera.depth && camera.depth_lens.distorts()) fill_depth_rays();

@@ -13,7 +13,7 @@ namespace {
 
 using core::KeyframeId;
 
-/// Looking the same way: angle between the optical axes, and how far apart in units of the scene's depth.
+/// True if two cameras look the same way and are close together, in units of the scene's depth.
 bool overlaps(const geometry::Rigid3& a_from_world, const geometry::Rigid3& b_from_world, double max_angle) {
   const geometry::Rigid3 a_from_b = a_from_world * b_from_world.inverse();
   return a_from_b.rotation(2, 2) > std::cos(max_angle) && a_from_b.translation.norm() < 1.0;

@@ -8,7 +8,7 @@
 namespace plumbline::tracking {
 namespace {
 
-/// Image of a 3D segment, cut off at the near plane; false when it is not in the image.
+/// Projects a 3D segment, cut off at the near plane; false if it is not in the image.
 bool project_segment(const maps::MapLine& line, const geometry::Rigid3& camera_from_world,
                      const sensor::Pinhole& camera, features::LineSegment& segment) {
   constexpr double kNear = 0.1;  // metres
@@ -17,6 +17,7 @@ bool project_segment(const maps::MapLine& line, const geometry::Rigid3& camera_f
   if (a.z() < kNear && b.z() < kNear) return false;
   if (a.z() < kNear) a += (b - a) * ((kNear - a.z()) / (b.z() - a.z()));
   if (b.z() < kNear) b += (a - b) * ((kNear - b.z()) / (a.z() - b.z()));
+
   segment.start = camera.project(a).cast<float>();
   segment.end = camera.project(b).cast<float>();
   const Eigen::Vector2f low = segment.start.cwiseMin(segment.end);
@@ -25,7 +26,7 @@ bool project_segment(const maps::MapLine& line, const geometry::Rigid3& camera_f
          low.y() < static_cast<float>(camera.height) && segment.length() > 10.0F;
 }
 
-/// Properties of a line of the frame that every landmark is compared with.
+/// Geometry of a line feature of the frame, computed once for all landmarks.
 struct LineCandidate {
   Eigen::Vector2f direction;
   Eigen::Vector2f middle;
@@ -49,6 +50,7 @@ std::vector<LineMatch> match_lines(const maps::Map& map, const std::vector<core:
                                    const AssociationOptions& options, std::vector<core::LineId>* visible) {
   const auto min_cosine = static_cast<float>(std::cos(options.max_line_angle_rad));
   const std::vector<LineCandidate> candidates = candidates_of(frame);
+
   std::vector<LineMatch> by_feature(frame.lines.size());
   for (core::LineId id : lines) {
     const maps::MapLine* line = map.find(id);

@@ -11,7 +11,7 @@
 namespace plumbline::tracking {
 namespace {
 
-/// Depth at half resolution, averaged over about 7 px of one surface.
+/// Depth at half resolution, averaged over up to 6 x 6 pixels of one surface.
 struct HalfDepth {
   int width = 0;
   int height = 0;
@@ -19,6 +19,7 @@ struct HalfDepth {
   [[nodiscard]] float at(int x, int y) const { return z[static_cast<std::size_t>(y * width + x)]; }
 };
 
+/// Largest difference between depths of one surface at depth `z`, metres.
 float same_surface(float z) { return 0.01F * z + 4.0F * static_cast<float>(sensor::depth_sigma(z)); }
 
 /// Mean of the valid values within (2 * radius + 1)^2 that belong to the surface at the middle.
@@ -55,8 +56,8 @@ HalfDepth half_depth(const cv::Mat& depth) {
       float sum = 0.0F;
       int count = 0;
       float low = 1e9F;
-
       float high = 0.0F;
+
       for (float v : q) {
         if (!(v > 0.0F)) continue;
         sum += v;
@@ -83,7 +84,8 @@ HalfDepth half_depth(const cv::Mat& depth) {
   return smooth;
 }
 
-/// The widest pair of opposite neighbours (in half pixels) over which depth runs straight; 0: none.
+/// Distance (in pixels of HalfDepth) of the farthest pair of opposite neighbours between which depth is
+/// linear; 0: none.
 int straight_base(const HalfDepth& depth, int x, int y, int dx, int dy) {
   const float centre = depth.at(x, y);
   const float tolerance = 0.5F * same_surface(centre);
@@ -102,8 +104,8 @@ int straight_base(const HalfDepth& depth, int x, int y, int dx, int dy) {
 
 struct SurfaceCandidate {
   maps::SurfaceSample sample;
-  int cell = 0;  ///< of the image
-  int bin = 0;   ///< of the directions
+  int cell = 0;  ///< cell of the image
+  int bin = 0;   ///< bin of the normal's direction
 };
 
 constexpr int kCellsX = 16;
@@ -159,7 +161,7 @@ std::vector<SurfaceCandidate> candidates(const HalfDepth& depth, const sensor::P
   return result;
 }
 
-/// Takes up to `wanted` of `order`, one from each group in turn.
+/// Marks up to `wanted` candidates as taken, in `order`, one from each group in turn.
 template <typename GroupOf>
 void take_evenly(const std::vector<SurfaceCandidate>& all, const std::vector<std::uint32_t>& order,
                  GroupOf group_of, int groups, int wanted, std::vector<char>& taken) {
@@ -194,10 +196,10 @@ std::vector<maps::SurfaceSample> sample_surface(const cv::Mat& depth, const sens
                                                 const SurfaceSamplerOptions& options) {
   if (depth.empty()) return {};
   const std::vector<SurfaceCandidate> all = candidates(half_depth(depth), camera, options);
-  // A fixed scrambled order, so that "the first of a group" is not always its top-left corner.
+
+  // A fixed scrambled order, so that the first of a group is not always the one at its top left.
   std::vector<std::uint32_t> order(all.size());
   for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
-
   const auto scramble = [](std::uint32_t i) {
     i ^= i >> 16;
     i *= 0x7feb352dU;
@@ -205,7 +207,6 @@ std::vector<maps::SurfaceSample> sample_surface(const cv::Mat& depth, const sens
     i *= 0x846ca68bU;
     return i ^ (i >> 16);
   };
-
   std::sort(order.begin(), order.end(),
             [&](std::uint32_t a, std::uint32_t b) { return scramble(a) < scramble(b); });
 

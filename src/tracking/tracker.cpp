@@ -2,11 +2,9 @@
 #include "plumbline/tracking/tracker.hpp"
 
 namespace plumbline::tracking {
-
 namespace {
 
-/// Features without the image pyramid, to be kept once the frame is tracked; corners lie where they were
-/// aligned.
+/// Features without the image pyramid, to be kept after tracking; corners at their aligned positions.
 Tracker::Features without_pyramid(const features::FrameFeatures& features,
                                   const std::vector<PointMatch>& matches, const sensor::Pinhole& camera) {
   auto kept = std::make_shared<features::FrameFeatures>(features);
@@ -39,7 +37,7 @@ void TrackerOptions::declare(core::OptionTable& table) {
                 "Synchronise colour and depth with different stamps by the motion model");
   table.boolean("thumbnails", thumbnails, "Search for the camera's pose with small images");
   table.boolean("motion_prior", motion_prior,
-                "Hold directions that measurements leave open by the motion model");
+                "Constrain directions that measurements leave free by the motion model");
   table.boolean(
       "pnp_start", pnp_start,
       "Start every frame with PnP over descriptors, if there are enough, instead of the motion model");
@@ -61,6 +59,7 @@ Tracker::Tracker(const TrackerOptions& options, const sensor::Pinhole& camera)
 TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features) {
   motion_.set_odometry(frame.odometry);
   if (map.keyframe_count() == 0) return initialise(frame, features);
+
   const Features synced = synchronised(frame, features, motion_.velocity());
   const bool outdated = motion_.outdated();
   std::optional<TrackResult> result =
@@ -68,6 +67,7 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
   if (!result)
     result = outdated ? track_with_motion_model(map, frame, *synced) : relocalise(map, frame, *synced);
   if (!result) return lost(frame);
+
   if (result->features == nullptr) result->features = synced;
   record(frame, *result);
   return *std::move(result);

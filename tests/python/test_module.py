@@ -256,6 +256,11 @@ class Results(Folder):
         self.assertEqual((result.camera.width, result.camera.height), (320, 240))
         self.assertEqual(result.image(int(keyframes.frames[-1])).color.shape, (240, 320, 3))
 
+    def test_an_image_is_of_the_part_of_the_recording_that_was_mapped(self):
+        result = plumbline.map(self.recording, self.work / "part", start=0.3, every=2, format="tum")
+        number = int(result.keyframes.frames[-1])
+        self.assertAlmostEqual(result.image(number).stamp, result.keyframes.stamps[-1], places=5)
+
     def test_covariances_are_those_of_the_export(self):
         plumbline.export(self.result, self.work / "poses.csv", what="trajectory")
         with open(self.work / "poses.csv", encoding="utf-8") as file:

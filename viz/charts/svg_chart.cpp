@@ -37,7 +37,7 @@ struct Extent {
   }
 };
 
-/// About its middle.
+/// Scales a range about its middle.
 void widen(AxisRange& range, double factor) {
   const double middle = 0.5 * (range.first + range.second);
   const double half = 0.5 * (range.second - range.first) * factor;

@@ -22,7 +22,7 @@ namespace plumbline::report {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();  ///< unknown value
 
-/// The way of one robot in the frame of the results.
+/// The path of one robot in the frame of the results.
 struct ReportPath {
   std::size_t number = 0;  ///< of the robot in the map; its colour
   std::string robot;       ///< empty: the only one

@@ -14,7 +14,7 @@ namespace plumbline::report {
 
 /// "1 519 937"; like all of these, a dash if not known (NaN).
 std::string count_text(double count);
-/// With its unit: "12.3 ms".
+/// Number with its unit: "12.3 ms".
 std::string number_text(double value, int decimals, std::string_view unit = {});
 /// "54.7 MB"
 std::string bytes_text(double bytes);
@@ -55,11 +55,11 @@ class RobotTable {
 using Facts = std::vector<std::pair<std::string, std::string>>;
 /// Name and value, line by line; those without a value are left out.
 std::string facts_html(const Facts& facts);
-/// The same, large, side by side.
+/// The same in large type, in one row.
 std::string tiles_html(const Facts& facts);
 std::string paragraph(const std::string& text);
 std::string note(const std::string& text);
-/// Can be folded up to its title, and is unless `open`.
+/// Section that can be folded up to its title; folded unless `open`.
 std::string folded(const std::string& title, const std::string& html, bool open = false);
 
 /// A part of the page with its place in the table of contents.
@@ -69,7 +69,7 @@ struct Section {
   std::string html;  ///< empty: the part is left out
 };
 
-/// By this a report is known as one.
+/// Text by which a file is recognised as a report.
 inline const char* const kReportGenerator = "plumbline report";
 
 /// CSS of the page: light, dark and on paper.

@@ -15,8 +15,8 @@ namespace {
 constexpr Rgb kInk{45, 48, 54};
 constexpr Rgb kFaint{110, 114, 122};
 constexpr Rgb kWhite{255, 255, 255};
-constexpr Rgb kGround{250, 250, 248};  // under text, where points may run behind it
-constexpr double kTextSize = 22.0;     // pixels of a 1200 px high picture
+constexpr Rgb kGround{250, 250, 248};  // background of text that points may lie behind
+constexpr double kTextSize = 22.0;     // in pixels, if the picture is 1200 px high
 
 Eigen::Vector2d on_picture(const Projection& projection, const Eigen::Vector3d& p) {
   return projection.project(p).head<2>();
@@ -26,7 +26,7 @@ bool in_front(const Projection& projection, const Eigen::Vector3d& p) {
   return p.allFinite() && (projection.orthographic || (p - projection.eye).dot(projection.forward) > 0.02);
 }
 
-/// A line with a white edge, readable on any ground.
+/// Draws a line with a white edge, readable on any background.
 void cased_line(Painter& painter, const std::vector<Eigen::Vector2d>& line, const Rgb& color, double width) {
   painter.polyline(line, kWhite, width + 2.0);
   painter.polyline(line, color, width);
@@ -80,6 +80,7 @@ void draw_title_and_legend(Painter& painter, const OverlayContent& content) {
   const double s = painter.scale();
   double y = content.projection.height_px - 40.0 * s;
   const double x = 36.0 * s;
+
   if (!content.scene->title.empty()) {
     const double width = painter.text_width(content.scene->title, 30.0, true);
     painter.rectangle({x - 8.0 * s, y - 24.0 * s}, {width + 16.0 * s, 48.0 * s}, kGround, 0.8);
@@ -112,6 +113,7 @@ void draw_scale_bar(Painter& painter, const OverlayContent& content) {
   const double depth = 0.5 * (projection.near_m + projection.far_m);
   const double per_metre = projection.pixels_per_metre(depth);
   const double metres = nice_number_below(0.22 * projection.width_px / per_metre);
+
   const double s = painter.scale();
   const double length = metres * per_metre;
   const Eigen::Vector2d left(36.0 * s, 40.0 * s);
@@ -119,12 +121,13 @@ void draw_scale_bar(Painter& painter, const OverlayContent& content) {
   painter.rectangle(left, {length, 6.0 * s}, kInk);
   painter.rectangle(left, {2.0 * s, 14.0 * s}, kInk);
   painter.rectangle(left + Eigen::Vector2d(length - 2.0 * s, 0.0), {2.0 * s, 14.0 * s}, kInk);
-  // In perspective the bar holds at the middle of the scene only.
+
+  // In perspective the bar is true at the middle of the scene only.
   const std::string text = projection.orthographic ? length_text(metres) : "~ " + length_text(metres);
   painter.text(left + Eigen::Vector2d(0.5 * length, 28.0 * s), text, kTextSize, kInk, Anchor::kCentre);
 }
 
-/// The map frame's axes in the lower right corner.
+/// Draws the map frame's axes in the lower right corner.
 void draw_axes(Painter& painter, const OverlayContent& content) {
   const Projection& projection = content.projection;
   const double s = painter.scale();
@@ -134,7 +137,7 @@ void draw_axes(Painter& painter, const OverlayContent& content) {
 
   const std::array<Rgb, 3> colors{{{200, 50, 50}, {40, 150, 60}, {45, 90, 200}}};
   const std::array<const char*, 3> names{"x", "y", "z"};
-  std::array<int, 3> order{0, 1, 2};  // the axis that points away from the viewer first
+  std::array<int, 3> order{0, 1, 2};  // sorted below: axes that point away from the viewer first
   std::sort(order.begin(), order.end(),
             [&projection](int a, int b) { return projection.forward[a] > projection.forward[b]; });
 
@@ -155,7 +158,7 @@ void draw_axes(Painter& painter, const OverlayContent& content) {
   }
 }
 
-/// A vertical bar from `corner` (lower left) upwards, ticks to its right.
+/// Draws a vertical bar from `corner` (lower left) upwards, with ticks to its right.
 void draw_color_bar(Painter& painter, const ColorScale& scale, const Eigen::Vector2d& corner, double height,
                     double text_px) {
   constexpr int kSteps = 128;
@@ -167,6 +170,7 @@ void draw_color_bar(Painter& painter, const ColorScale& scale, const Eigen::Vect
     painter.rectangle(corner + Eigen::Vector2d(0.0, i * step), {width, last ? step : 2.0 * step},
                       sequential_color((i + 0.5) / kSteps));
   }
+
   const double span = scale.high - scale.low;
   for (const Tick& tick : nice_ticks(scale.low, scale.high, span / 5.0)) {
     const double y = corner.y() + height * (tick.value - scale.low) / span;

@@ -21,7 +21,7 @@ struct OverlayContent {
 void draw_paths(Painter& painter, const OverlayContent& content);
 void draw_annotations(Painter& painter, const OverlayContent& content);
 
-/// "20 cm", "5 m": a length as people say it.
+/// A length with a suitable unit: "20 cm", "5 m".
 std::string length_text(double metres);
 
 }  // namespace plumbline::viz

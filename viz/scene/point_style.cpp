@@ -18,7 +18,7 @@ namespace {
 
 using Point = pcl::PointXYZRGBNormal;
 
-// A wall seen edge-on has normals that scatter about 90 degrees to the view; it must not fall to pieces.
+// A wall seen edge-on has normals that scatter about 90 degrees to the view; it must not get holes.
 constexpr double kFacesAway = -0.2;
 constexpr double kSurroundedAway = -0.4;
 

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-
 #include "plumbline/viz/snapshot.hpp"
 
 namespace plumbline::viz {

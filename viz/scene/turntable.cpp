@@ -63,7 +63,7 @@ SceneExtent extent_of(const Scene& scene) {
 core::Result<void> render_turntable(const Scene& scene, const SnapshotOptions& options, int pictures,
                                     const std::filesystem::path& folder,
                                     const std::function<void(std::size_t, std::size_t)>& progress) {
-  if (pictures < 2) return core::usage_error("turntable: at least 2 pictures make one turn");
+  if (pictures < 2) return core::usage_error("turntable: at least 2 pictures are needed");
   if (auto made = core::make_folder(folder); !made) return made;
 
   SnapshotOptions view = options;

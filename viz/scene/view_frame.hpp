@@ -35,7 +35,7 @@ struct Projection {
   /// (x, y) in pixels from the lower left corner, z = depth along `forward`, metres.
   [[nodiscard]] Eigen::Vector3d project(const Eigen::Vector3d& p) const;
   [[nodiscard]] double pixels_per_metre(double depth_m) const;
-  /// From p towards the viewer, unit.
+  /// Unit direction from p towards the viewer.
   [[nodiscard]] Eigen::Vector3d to_viewer(const Eigen::Vector3d& p) const;
 };
 

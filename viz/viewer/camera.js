@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Where one looks from, and how mouse, fingers and keys move it: z is up.
+// The camera, and how mouse, fingers and keys move it; z is up.
 const kFieldOfView = 2 * Math.tan(Math.PI / 6);
 const kEyeHeight_m = 1.6;
 
@@ -22,7 +22,7 @@ class Camera {
   get eye() { return sub(this.target, mul(this.ahead, this.distance)); }
   get height() { return kFieldOfView * (this.flat ? this.distance : 1); }
 
-  /** Looks from another place, as far ahead as before. */
+  /** Moves the eye; the distance to the target stays. */
   set eye(place) { this.target = add(place, mul(this.ahead, this.distance)); }
 
   look(mode) {
@@ -44,13 +44,13 @@ class Camera {
     if (this.mode === 'walk') this.eye = eye;
   }
 
-  /** By parts of the picture's height, at the distance of the target. */
+  /** Pans by shares of the picture's height, at the distance of the target. */
   pan(x, y) {
     const s = this.distance * kFieldOfView;
     this.target = add(this.target, add(mul(this.right, -x * s), mul(this.up, y * s)));
   }
 
-  /** `factor` times as near to a place, which stays where it is in the picture. */
+  /** Zooms by `factor` towards a place, which stays where it is in the picture. */
   zoom(factor, anchor) {
     const next = clamp(this.distance * factor, 0.05, 2000);
     factor = next / this.distance;
@@ -58,13 +58,13 @@ class Camera {
     this.distance = next;
   }
 
-  /** In the horizontal plane, metres; and up. */
+  /** Moves in the horizontal plane and up, metres. */
   walk(ahead, right, up) {
     const way = [Math.cos(this.yaw), Math.sin(this.yaw), 0];
     this.target = add(this.target, add(add(mul(way, ahead), mul(this.right, right)), [0, 0, up]));
   }
 
-  /** Matrix and what else a picture needs, for a scene within `radius` of `middle`. */
+  /** Matrix and other data that a picture needs, for a scene within `radius` of `middle`. */
   lens(aspect, middle, radius) {
     const eye = this.eye, back = mul(this.ahead, -1), reach = length(sub(eye, middle)) + radius;
     const depth = dot(sub(middle, eye), this.ahead);
@@ -88,7 +88,7 @@ class Camera {
   }
 }
 
-/** Hands on to a view what pointers, wheel and keys do. */
+/** Passes actions of pointers, wheel and keys to a view. */
 class Controls {
   constructor(view, canvas) {
     this.view = view;
@@ -107,7 +107,7 @@ class Controls {
     on('blur', () => this.keys.clear());
   }
 
-  /** Pixels of the page from the canvas's corner. */
+  /** Position relative to the canvas's corner, page pixels. */
   place(e) {
     const box = this.canvas.getBoundingClientRect();
     return [e.clientX - box.left, e.clientY - box.top];
@@ -178,7 +178,7 @@ class Controls {
     this.view.changed();
   }
 
-  /** What the held keys do in `seconds`; whether any is held. */
+  /** Applies the held keys for `seconds`; true if any is held. */
   held(seconds) {
     const on = (a, b) => (this.keys.has('Key' + a) ? 1 : 0) - (this.keys.has('Key' + b) ? 1 : 0);
     const { camera } = this.view, way = [on('W', 'S'), on('D', 'A'), on('E', 'Q')];

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The scene as it stands in the page, and points out of their packed bytes (README.md has the form).
+// The scene as stored in the page, and unpacking of points (README.md describes the format).
 
-/** Unit vectors of the 16 x 16 directions that a point keeps to be drawn by: three numbers each. */
+/** Unit vectors of the 16 x 16 directions that points are drawn with: three numbers each. */
 const kDirections = new Float32Array(256 * 3);
 for (let i = 0; i < 256; ++i) kDirections.set(unfolded((i & 15) / 7 - 1, (i >> 4) / 7 - 1), 3 * i);
 
@@ -29,7 +29,7 @@ async function inflated(bytes, size) {
   }
 }
 
-/** One cloud: `data` gives the packed bytes of a piece by its number, once. */
+/** One cloud; `data` returns the packed bytes of a piece by its number, once only. */
 class CloudData {
   constructor(json, data, base) {
     Object.assign(this, json);
@@ -43,7 +43,7 @@ class CloudData {
     }
   }
 
-  /** Reads place, colour and direction of the chunk's points. */
+  /** Reads position, colour and direction of the chunk's points. */
   async open(chunk) {
     const n = chunk.count, bytes = await inflated(this.data(chunk.data[0]), (this.colored ? 9 : 6) * n);
     const folds = chunk.data[1] < 0 ? null : await inflated(this.data(chunk.data[1]), 2 * n);
@@ -102,7 +102,7 @@ class CloudData {
   }
 }
 
-/** A layer's value by its step. */
+/** Value of a layer's step. */
 function valueOf(layer, step) {
   if (step === 0) return NaN;
   if (layer.scale === 'category' || layer.scale === 'view') return step - 1;

@@ -34,7 +34,7 @@ class Painter {
     return { program, at };
   }
 
-  /** Takes a program, its uniforms as numbers, vectors and matrices; `textures`: on units 0, 1 ... */
+  /** Selects a program and sets its uniforms: numbers, vectors and matrices; `textures`: on units 0, 1 ... */
   use({ program, at }, values, textures = {}) {
     const gl = this.gl;
     gl.useProgram(program);
@@ -50,7 +50,7 @@ class Painter {
     });
   }
 
-  /** Draws into a target, null: on the canvas. */
+  /** Selects the target; null: the canvas. */
   into(target) {
     const { gl } = this, { width, height } = target || this.canvas;
     gl.bindFramebuffer(gl.FRAMEBUFFER, target && target.buffer);
@@ -87,7 +87,7 @@ class Painter {
     this.palette = this.texture(gl.RGB8, 256, 1, gl.RGB, gl.UNSIGNED_BYTE, bytes);
   }
 
-  /** A buffer with numbers, and who takes which of them: places of [size, type, normalised, offset]. */
+  /** A buffer with numbers, and its attributes by location: [size, type, normalised, offset]. */
   fill(array, buffer, numbers, stride, places, first = 0, divisor = 0) {
     const { gl } = this;
     gl.bindVertexArray(array);
@@ -120,7 +120,7 @@ class Painter {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
   }
 
-  /** Chunks of one cloud into a target. `look`: view matrix, splat sizes, cut, colours. */
+  /** Draws chunks of one cloud into a target. `look`: view matrix, splat sizes, cut, colours. */
   drawPoints(which, cloud, chunks, look) {
     const { gl } = this;
     this.into(this.targets[which]);
@@ -138,7 +138,7 @@ class Painter {
     gl.bindVertexArray(null);
   }
 
-  /** The front target lit on the canvas, lines over it. */
+  /** Draws the front target with lighting on the canvas, and lines over it. */
   compose(lens, ground, sets, look) {
     const { gl, canvas } = this, { width, height, color, depth } = this.targets[this.front], scale = [width / canvas.width, height / canvas.height];
     this.into(null);

@@ -17,11 +17,11 @@ constexpr std::size_t kFirstLevel = 120000;  // points, at most: what is seen at
 constexpr double kStep_m = 0.002;            // of the grid
 constexpr double kMostSteps = 65535.0;
 constexpr int kBits = 16;         // of a coordinate
-constexpr int kCompression = 12;  // of libdeflate's 1 to 12
+constexpr int kCompression = 12;  // libdeflate's level, 1 to 12
 
 using Steps = std::array<std::uint16_t, 3>;
 
-/// Every third bit of the result is one of `value`.
+/// Puts the bits of `value` into every third bit of the result.
 std::uint64_t spread(std::uint64_t value) {
   value = (value | value << 32U) & 0x1f00000000ffffULL;
   value = (value | value << 16U) & 0x1f0000ff0000ffULL;
@@ -32,7 +32,7 @@ std::uint64_t spread(std::uint64_t value) {
 
 std::uint64_t morton(const Steps& p) { return spread(p[0]) | spread(p[1]) << 1U | spread(p[2]) << 2U; }
 
-/// Mixes bits: which point of a cell stands for it must not lean to a corner.
+/// Mixes bits, so that the point chosen for a cell is not always near the same corner.
 std::uint64_t mixed(std::uint64_t value) {
   value = (value ^ value >> 31U) * 0x9e3779b97f4a7c15ULL;
   return value ^ value >> 29U;
@@ -47,7 +47,7 @@ std::string packed(const std::vector<std::uint8_t>& bytes) {
   return out;
 }
 
-/// Small steps of both signs as small numbers.
+/// Encodes small steps of either sign as small numbers.
 std::uint16_t zigzag(std::uint16_t value, std::uint16_t before) {
   const auto step = static_cast<std::int16_t>(static_cast<std::uint16_t>(value - before));
   return static_cast<std::uint16_t>(static_cast<std::uint16_t>(step) << 1U ^ (step < 0 ? 0xFFFFU : 0U));
@@ -119,7 +119,7 @@ Grid on_grid(const Points& points, bool z_up, EncodedCloud& out) {
   return grid;
 }
 
-/// Cells of 2^bits steps that have a point, for each number of bits.
+/// Number of cells of 2^bits steps that have a point, for each number of bits.
 std::array<std::size_t, kBits + 1> occupied(const std::vector<std::uint64_t>& codes) {
   std::array<std::size_t, kBits + 1> cells{};
   for (std::size_t i = 0; i < codes.size(); ++i) {
@@ -131,7 +131,7 @@ std::array<std::size_t, kBits + 1> occupied(const std::vector<std::uint64_t>& co
   return cells;
 }
 
-/// The edges of the levels' cells, as bits, coarsest first; the last level takes all points: 0.
+/// Edge of each level's cells, as bits, coarsest first; the last level takes all points: 0.
 std::vector<unsigned> level_bits(const std::array<std::size_t, kBits + 1>& cells, std::size_t count) {
   std::vector<unsigned> levels;
   if (count > kFirstLevel) {
@@ -143,7 +143,7 @@ std::vector<unsigned> level_bits(const std::array<std::size_t, kBits + 1>& cells
   return levels;
 }
 
-/// The level of each point: of each cell that no coarser level has a point of, one point.
+/// The level of each point. A level has one point of each of its cells that has no point of a coarser level.
 std::vector<std::uint8_t> levels_of(const Grid& grid, const std::vector<unsigned>& bits) {
   const std::size_t count = grid.codes.size();
   const auto last = static_cast<std::uint8_t>(bits.size() - 1);
@@ -190,7 +190,7 @@ std::string packed_points(const Points& points, const Grid& grid, const std::vec
   return packed(bytes);
 }
 
-/// Of a unit vector folded onto an octahedron (Cigolle et al. 2014), in steps that people's eyes need.
+/// Encodes a unit vector folded onto an octahedron (Cigolle et al. 2014), in steps fine enough for shading.
 std::array<int, 2> folded(const Eigen::Vector3d& normal) {
   constexpr double kHalf = 15.0;  // 31 steps
   const Eigen::Vector3d n = normal / normal.lpNorm<1>();
@@ -221,7 +221,7 @@ std::string packed_normals(const Points& points, const Grid& grid, const std::ve
   return packed(bytes);
 }
 
-/// 0: not known; else 1 to steps + 1 over the layer's range, or 1 + the number.
+/// Code of a value: 0: not known; else 1 to steps + 1 over the layer's range, or 1 + the category.
 int step_of(const Layer& layer, float value) {
   if (!std::isfinite(value)) return 0;
   if (layer.scale == Scale::kCategory || layer.scale == Scale::kView) return 1 + static_cast<int>(value);
@@ -264,8 +264,8 @@ EncodedCloud encode(const Points& points, bool z_up) {
   const std::vector<unsigned> bits = level_bits(cells, count);
   const std::vector<std::uint8_t> level = levels_of(grid, bits);
 
-  // Of the finest level the spacing follows from how the next coarser cells fill: four to a cell are as wide
-  // apart as half its edge.
+  // The spacing of the finest level follows from the points per cell of a coarser one: with four of them it
+  // is half the cell's edge.
   for (const unsigned b : bits) out.spacing_m.push_back(out.step_m * static_cast<double>(1U << b));
 
   unsigned edge = 1;

@@ -23,9 +23,9 @@ struct Chunk {
 };
 
 struct EncodedCloud {
-  std::array<double, 3> origin{};  ///< of the grid, in the frame that is shown
-  double step_m = 0.002;           ///< of the grid
-  std::vector<double> spacing_m;   ///< of each level with those before: mean distance of neighbours
+  std::array<double, 3> origin{};  ///< origin of the grid, in the frame that is shown
+  double step_m = 0.002;           ///< step of the grid, metres
+  std::vector<double> spacing_m;   ///< mean distance of neighbours in each level with those before
   std::vector<Chunk> chunks;       ///< by level, then in Morton order
 };
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A map that grows while it is looked at: pieces of it, and where the robots are, come as server-sent events. Only in
-// pages that are served by a run.
+// Shows a growing map: its parts and the robots' poses arrive as server-sent events. Only in pages that are served by
+// a run.
 function listen(panel) {
   const { view, scene } = panel, source = new EventSource(scene.live + location.search);
   let known = 0;
 
-  /** A keyframe's cloud, in the place of the one that it had. */
+  /** Adds a keyframe's cloud; it replaces an earlier one. */
   const piece = async ({ key, robot, cloud }) => {
     const made = new CloudData(cloud, (n) => bytesOf(cloud.data[n]), view.base);
     for (const chunk of made.chunks) await made.open(chunk);

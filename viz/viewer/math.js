@@ -20,7 +20,7 @@ function product(a, b) {
   return out;
 }
 
-/** What lies `height` high at distance 1 (at every distance: `flat`) fills the picture. */
+/** Projection in which an object `height` high at distance 1 (`flat`: at any distance) fills the picture. */
 function projection(height, aspect, near, far, flat) {
   const y = 2 / height, x = y / aspect, m = new Float64Array(16);
   m[0] = x;
@@ -31,13 +31,13 @@ function projection(height, aspect, near, far, flat) {
   return m;
 }
 
-/** From the world into an eye with these axes. */
+/** View matrix of an eye with these axes. */
 function viewing(eye, right, up, back) {
   return new Float64Array([right[0], up[0], back[0], 0, right[1], up[1], back[1], 0, right[2], up[2], back[2], 0,
     -dot(right, eye), -dot(up, eye), -dot(back, eye), 1]);
 }
 
-/** A quaternion x y z w turns v. */
+/** Rotates v by a quaternion x y z w. */
 function turned(q, v) {
   const t = mul(cross(q, v), 2);
   return add(add(v, mul(t, q[3])), cross(q, t));

@@ -189,7 +189,7 @@ Json scene_json(const Scene& scene, Pieces& pieces, Cost& cost) {
   return json;
 }
 
-/// JSON that may stand in a script: nothing in it ends one or begins a comment.
+/// JSON that may be put into a script: nothing in it ends the script or begins a comment.
 std::string in_script(const Json& json) {
   const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
   std::string out;

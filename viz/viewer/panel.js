@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Buttons, legend, help, time, and the text that lies over the picture.
+// Buttons, legend, help, time, and the text over the picture.
 const kHelp = [
   ['Drag', 'turn; in the top view move'],
   ['Right button, Shift, two fingers', 'move'],
@@ -19,7 +19,7 @@ const kHelp = [
   ['?', 'this help'],
 ];
 
-/** An element: its attributes, then what is in it. */
+/** Makes an element with attributes and children. */
 function element(name, attributes = {}, ...inside) {
   const made = document.createElement(name);
   for (const [key, value] of Object.entries(attributes)) {
@@ -144,7 +144,7 @@ class Panel {
     then(list.value);
   }
 
-  /** What a key does; false: nothing. */
+  /** Handles a key; false if it has no function. */
   command(key) {
     const { view, measuring } = this, modes = { 1: 'orbit', 2: 'walk', 3: 'top' };
     const does = {
@@ -238,7 +238,7 @@ class Panel {
     return this.handles().find((h) => h.at && Math.hypot(h.at[0] - x, h.at[1] - y) < 14) || null;
   }
   handles() { return handlesOf(this.view).map((h) => ({ ...h, at: this.view.project(h.p) })); }
-  /** The handle goes along its axis to where the pointer's ray passes nearest. */
+  /** Moves the handle along its axis to the point nearest to the pointer's ray. */
   drag(handle, x, y) {
     const { from, way } = this.view.ray(x, y), axis = [0, 0, 0];
     axis[handle.axis] = 1;
@@ -283,7 +283,7 @@ class Panel {
 
   // Time.
 
-  /** Puts the eye where the camera of the first path was, at a share of its time. */
+  /** Moves the eye to the camera of the first path, at a share of its time. */
   goTo(share) {
     const path = this.scene.paths[0], n = path.t.length, t = path.t[0] + share * (path.t[n - 1] - path.t[0]), { camera } = this.view;
     let i = path.t.findIndex((v) => v > t) - 1;
@@ -320,7 +320,7 @@ class Panel {
     this.timeBar.firstChild.textContent = '▶';
   }
 
-  // What lies over the picture.
+  // Text over the picture.
 
   hear(what) {
     if (what === 'drawn') this.drawOver();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Begins with the element that the page has for the viewer.
+// Starts the viewer in the page's element for it.
 function start(root) {
   const pieces = new Map();
   for (const piece of root.querySelectorAll('.pv-data')) pieces.set(Number(piece.dataset.n), piece);

@@ -27,7 +27,7 @@ class Measuring {
     this.tool = tool;
   }
 
-  /** A place of the picture becomes the next point. */
+  /** Adds the point at a place of the picture. */
   async add(x, y) {
     const hit = this.view.pick(x, y);
     if (!hit) return null;
@@ -44,7 +44,7 @@ class Measuring {
     return point;
   }
 
-  /** Ends a line or an area; one that is too short is given up. */
+  /** Ends a line or an area; one that is too short is dropped. */
   end() {
     const open = this.open;
     this.open = null;
@@ -57,12 +57,12 @@ class Measuring {
     this.view.told('measured');
   }
 
-  /** Of a point the standard deviation that the map tells; NaN: it tells none. */
+  /** Standard deviation of a point according to the map; NaN: unknown. */
   async sigma({ cloud, chunk, i }) {
     const at = cloud.layer('sigma');
     return at < 0 ? NaN : valueOf(cloud.layers[at], (await cloud.values(chunk, at))[i]);
   }
-  /** The keyframe that saw the point best; -1: none is known. */
+  /** The keyframe that saw the point best; -1: unknown. */
   async seen({ cloud, chunk, i }) {
     const at = cloud.layer('view');
     return at < 0 ? -1 : (await cloud.values(chunk, at))[i] - 1;
@@ -92,7 +92,7 @@ class Measuring {
     m.error = error;
   }
 
-  /** A plane through the points near a place: fitted, then again to those near it. */
+  /** A plane through the points near a place: fitted, then fitted again to the points near the plane. */
   describePlane(m, place) {
     let plane = planeOf(this.view.around(place, 0.12)), off = [];
     for (const band of [0.05, 0.03]) {
@@ -116,7 +116,7 @@ class Measuring {
   text() { return this.list.map((m) => m.text).join('\n'); }
 }
 
-/** Of a polygon in space, seen along the direction in which it is largest. */
+/** Area of a polygon in space, seen along the direction in which it is largest. */
 function areaOf(p) {
   let sum = [0, 0, 0];
   for (let i = 2; i < p.length; ++i) sum = add(sum, cross(sub(p[i - 1], p[0]), sub(p[i], p[0])));
@@ -134,7 +134,7 @@ function planeOf(points) {
   return { middle, normal: flattest(s) };
 }
 
-/** Six numbers that a cut of this kind begins with. */
+/** The six initial numbers of a cut of this kind. */
 function startOfCut(view, kind) {
   const cut = { kind, low: [-1e9, -1e9, -1e9], high: [1e9, 1e9, 1e9] };
   if (kind === 'box') [cut.low, cut.high] = [view.inmost[0].slice(), view.inmost[1].slice()];
@@ -142,7 +142,7 @@ function startOfCut(view, kind) {
   return cut;
 }
 
-/** Where the handles of a cut are: middles of the faces of its box. */
+/** Positions of a cut's handles: the middles of the faces of its box. */
 function handlesOf(view) {
   const { kind, low, high } = view.cut;
   if (kind === 'none') return [];
@@ -158,7 +158,7 @@ function handlesOf(view) {
   return all;
 }
 
-/** Edges of the box that is cut out, as pairs of places. */
+/** Edges of the box that is cut out, as pairs of positions. */
 function edgesOfCut(view) {
   if (view.cut.kind === 'none') return [];
   const from = view.cut.low.map((v, k) => Math.max(v, view.low[k])), to = view.cut.high.map((v, k) => Math.min(v, view.high[k]));
@@ -169,7 +169,7 @@ function edgesOfCut(view) {
   return edges;
 }
 
-/** What is shown, at full detail, as binary PLY in the frame of the map's files. */
+/** The visible points at full detail, as binary PLY in the frame of the map's files. */
 function plyOf(view) {
   const parts = [];
   let count = 0;

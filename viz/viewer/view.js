@@ -32,7 +32,7 @@ class View {
     requestAnimationFrame((now) => this.frame(now));
   }
 
-  /** How far everything reaches, and where most of it is. */
+  /** Extent of everything, and the region that holds most of it. */
   measure() {
     const reach = (side, best) => kBox.map((_, k) => best(...this.clouds.flatMap((c) => c.chunks.map((chunk) => chunk[side][k])), this.inmost[side === 'low' ? 0 : 1][k]));
     this.inmost = this.scene.inmost.map((p) => this.local(p));
@@ -42,7 +42,7 @@ class View {
     this.radius = Math.max(1, ...[this.low, this.high].map((p) => length(sub(p, this.middle))));
   }
 
-  /** All of it, from where the cameras looked: what they saw faces them. */
+  /** Shows everything, from the side of the cameras, which the surfaces face. */
   home() {
     this.camera = new Camera();
     const { q } = this.scene.paths[0] || { q: [] };
@@ -54,7 +54,7 @@ class View {
     this.changed();
   }
 
-  /** Into another way of looking. */
+  /** Switches to another mode of navigation. */
   look(mode) {
     const { camera } = this;
     if (mode === camera.mode) return;
@@ -77,7 +77,7 @@ class View {
     this.changed();
   }
 
-  /** Where the camera once was, as high as a person's eye; or here. */
+  /** First position of the camera, at eye height; or the present position. */
   startOfWalk(elsewhere) {
     const path = this.scene.paths[0], { camera } = this;
     if (!elsewhere || !path || !path.t.length) {
@@ -88,7 +88,7 @@ class View {
   }
 
   local(p) { return sub(p, this.base); }
-  /** Coordinates as the map's files have them. */
+  /** Coordinates in the frame of the map's files. */
   ofMap(p) {
     const q = add(p, this.base);
     return this.scene.up ? q : [q[0], -q[2], q[1]];
@@ -119,7 +119,7 @@ class View {
     this.told('loaded');
   }
 
-  /** Draws anew without counting as movement. */
+  /** Draws again without counting as movement. */
   again() {
     this.dirty = true;
     this.refining = null;
@@ -143,7 +143,7 @@ class View {
     this.told('layer');
   }
 
-  /** Puts the layer's colour number beside each place of a chunk. */
+  /** Stores the layer's colour number of each point of a chunk. */
   async paint(cloud, chunk) {
     const { key } = this.layer, n = chunk.count, out = chunk.places, at = cloud.layer(key);
     if (chunk.painted === key || key === 'photo' || key === 'height') return;
@@ -159,7 +159,7 @@ class View {
     chunk.stale = true;
   }
 
-  /** Of each step the number of its colour; the palette's first is that of what is not known. */
+  /** Number of the colour of each step; the palette's first colour means unknown. */
   colorNumbers(layer) {
     if (layer.scale === 'category') return null;
     if (layer.scale !== 'view') return Array.from({ length: 256 }, (_, s) => (s ? 1 + Math.round(254 * Math.min(1, (s - 1) / layer.steps)) : 0));
@@ -200,7 +200,7 @@ class View {
     };
   }
 
-  /** Chunks in the picture that are dense enough to be wanted, coarse ones first, then those that gain most. */
+  /** Chunks in the picture that add visible detail, coarse ones first, then those that add most. */
   wanted(level) {
     const m = this.lens.matrix, list = [], focal = this.focal;
     for (const cloud of this.clouds) {
@@ -227,7 +227,7 @@ class View {
     return out !== 0;
   }
 
-  /** Draws chunks until the budget is spent; how many were drawn. */
+  /** Draws chunks until the budget is spent; returns the index of the next one, and the points drawn. */
   draw(which, list, from, level, budget) {
     let at = from, spent = 0;
     while (at < list.length && (spent < budget || spent === 0)) {
@@ -279,7 +279,7 @@ class View {
     this.sent = performance.now();
   }
 
-  /** A picture within the budget, at once. */
+  /** Draws a picture within the budget, at once. */
   quick(still) {
     const share = still || this.budget > 60000 ? 1 : 0.6;
     this.resize(share);
@@ -292,7 +292,7 @@ class View {
     this.refining = this.complete ? null : { level: -1 };
   }
 
-  /** The finest level that the budget holds all of. */
+  /** The finest level that fits the budget as a whole. */
   levelOf(list) {
     let sum = 0, level = 0;
     for (const { chunk } of list) {
@@ -303,7 +303,7 @@ class View {
     return level;
   }
 
-  /** A part of the next finer picture, which is shown when it is whole. */
+  /** Draws a part of the next finer picture, which is shown when it is complete. */
   refine() {
     const job = this.refining;
     if (job.level < 0) {
@@ -345,9 +345,9 @@ class View {
     this.told('drawn');
   }
 
-  // Places of the picture.
+  // Positions in the picture.
 
-  /** Pixels of the page, and how far away; null: behind. */
+  /** Position in page pixels, and the distance; null: behind the eye. */
   project(p) {
     const m = this.lens.matrix, w = m[3] * p[0] + m[7] * p[1] + m[11] * p[2] + m[15];
     if (w <= 0) return null;
@@ -403,7 +403,7 @@ class View {
     return length(sub(off, mul(way, along))) < radius + slack && along > -radius;
   }
 
-  /** What a zoom goes to. */
+  /** Target of a zoom. */
   anchor(x, y) {
     const coarse = this.pick(x, y, 1, 9);
     if (coarse) return coarse.p;

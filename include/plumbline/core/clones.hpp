@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// PLUMBLINE_CLONES: a function is compiled twice, for AVX2 and for any x86-64, and chosen when the program
-// starts. Both give the same bits: AVX2 alone does not bring fused multiply-add.
+// PLUMBLINE_CLONES compiles a function twice, for AVX2 and for any x86-64; the version is chosen when the
+// program starts. Both give the same bits, because AVX2 does not include fused multiply-add.
 #if defined(__x86_64__)
 #define PLUMBLINE_CLONES __attribute__((target_clones("avx2", "default")))
 #else

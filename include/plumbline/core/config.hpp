@@ -26,8 +26,8 @@ struct ConfigNode {
   ConfigMark mark;
   std::string scalar;
   bool quoted = false;            ///< the scalar was written in quotes: never a number or boolean
-  std::vector<ConfigNode> items;  ///< of a sequence
-  std::vector<std::pair<std::string, ConfigNode>> entries;  ///< of a map, in file order
+  std::vector<ConfigNode> items;  ///< items of a sequence
+  std::vector<std::pair<std::string, ConfigNode>> entries;  ///< entries of a map, in file order
   std::vector<ConfigMark> key_marks;                        ///< where each entry's key stands
 
   [[nodiscard]] const ConfigNode* find(const std::string& key) const;

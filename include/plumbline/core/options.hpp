@@ -40,8 +40,8 @@ struct OptionSpec {
   double min = std::numeric_limits<double>::lowest();
   double max = std::numeric_limits<double>::max();
   std::vector<std::string> choices;
-  std::size_t length = 0;  ///< of kNumbers: required count of numbers, 0 = any
-  std::string list_of;     ///< of kTextOrList: kind of the list's elements, such as "filters"
+  std::size_t length = 0;  ///< required count of numbers (kNumbers), 0 = any
+  std::string list_of;     ///< kind of the list's elements (kTextOrList), such as "filters"
   std::string help;
 };
 

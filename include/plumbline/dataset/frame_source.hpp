@@ -25,7 +25,7 @@ namespace plumbline::dataset {
 class MessageStream;
 
 struct PairInfo {
-  double stamp = 0.0;        ///< of colour, seconds
+  double stamp = 0.0;        ///< stamp of colour, seconds
   double depth_stamp = 0.0;  ///< seconds; the camera's depth_delay_s is in it
   std::string color_file;    ///< for messages; empty when there is no file
   std::string depth_file;
@@ -34,8 +34,8 @@ struct PairInfo {
 
 /// An image as a recording has it: the bytes of a file, or pixels.
 struct StoredImage {
-  std::string ending;               ///< of a file with such bytes: ".png", ".jpg" ...; "": there are pixels
-  std::vector<std::uint8_t> bytes;  ///< of the file
+  std::string ending;  ///< extension of a file with these bytes: ".png", ".jpg" ...; "": there are pixels
+  std::vector<std::uint8_t> bytes;  ///< bytes of the file
   cv::Mat pixels;                   ///< as read_image gives them
 };
 
@@ -47,7 +47,7 @@ struct StoredPair {
 /// Counts of a live source's images.
 struct LiveReport {
   std::size_t taken = 0;      ///< frames
-  std::size_t dropped = 0;    ///< frames that came while too many waited
+  std::size_t dropped = 0;    ///< frames that arrived while too many waited
   std::size_t backwards = 0;  ///< frames whose stamp was not later than the last one's
   std::size_t unpaired = 0;   ///< images of either kind without one of the other near them
   std::size_t lost = 0;       ///< messages that the network reported as lost
@@ -65,8 +65,8 @@ class FrameSource {
   [[nodiscard]] virtual PairInfo info(std::size_t index) const = 0;
   /// Decoded, rectified, depth in metres, gray filled in. An error is about this frame only: skip it.
   [[nodiscard]] virtual core::Result<sensor::RgbdFrame> read(std::size_t index) const = 0;
-  /// The images of a frame before anything was done to them, for copies of the recording: with camera() they
-  /// make the same frame. Error (kInput): about this frame only; or that the source has none.
+  /// The unprocessed images of a frame, for copies of the recording: with camera() they make the same frame.
+  /// Errors (kInput) are about this frame only, or say that the source has no stored images.
   [[nodiscard]] virtual core::Result<StoredPair> stored(std::size_t /*index*/) const {
     return core::input_error(name() + ": has no stored images");
   }
@@ -81,10 +81,10 @@ class FrameSource {
   virtual void wait_for(std::size_t /*index*/, std::chrono::milliseconds /*most*/) const {}
   /// For a live source: true if frame `index` can be read, or if it is known that no such frame will come.
   [[nodiscard]] virtual bool decided(std::size_t /*index*/) const { return true; }
-  /// For a live source: marks frame `index`, one of the latest 256 or so, as wanted again later; others are
-  /// forgotten.
+  /// For a live source: keeps frame `index`, one of the latest 256 or so, so that it can be read again;
+  /// others are released.
   virtual void keep(std::size_t /*index*/) const {}
-  /// For a live source: all is done with frame `index`, except that it may be read again if it was kept.
+  /// For a live source: frame `index` is no longer needed; it can be read again only if it was kept.
   virtual void release(std::size_t /*index*/) const {}
   /// True if frame `index`, which has been read, is the last one. A live source may wait until that is known,
   /// or until `stop`: then it is false.
@@ -107,9 +107,9 @@ class FrameSource {
 
 /// Use of the poses that come with a recording.
 enum class PoseUse {
-  kPrior,   ///< frames have those of the recorder's own odometry (a phone's): RgbdFrame::odometry
-  kGiven,   ///< they are used unchanged: the pipeline has no tracking
-  kIgnore,  ///< for nothing but comparison: truth() has them all the same
+  kPrior,   ///< poses of the recorder's own odometry (a phone's) go to RgbdFrame::odometry
+  kGiven,   ///< poses are used unchanged: the pipeline has no tracking
+  kIgnore,  ///< poses are used for comparison only: truth() still has them
 };
 
 /// Topics of a bag; "" is found automatically.
@@ -117,7 +117,7 @@ struct TopicNames {
   std::string color;
   std::string depth;
   std::string info;        ///< sensor_msgs/CameraInfo of colour
-  std::string depth_info;  ///< of depth, where that has a camera of its own
+  std::string depth_info;  ///< sensor_msgs/CameraInfo of a separate depth camera
   [[nodiscard]] bool any() const {
     return !(color.empty() && depth.empty() && info.empty() && depth_info.empty());
   }
@@ -132,21 +132,21 @@ struct LiveOptions {
   core::StopToken stop;                      ///< ends the source; numbered frames are still read
   double for_s = 1e300;                      ///< seconds after which it ends
   std::filesystem::path record;              ///< an MCAP file of the frames that were taken; "": none
-  bool replace = false;                      ///< an earlier such file
-  std::chrono::milliseconds patience{5000};  ///< until the first image must have come
-  std::size_t most_waiting_bytes = std::size_t{1024} << 20U;  ///< of waiting messages
+  bool replace = false;                      ///< replace an existing file
+  std::chrono::milliseconds patience{5000};  ///< time within which the first image must arrive
+  std::size_t most_waiting_bytes = std::size_t{1024} << 20U;  ///< total size of waiting messages
 };
 
 struct OpenOptions {
   std::string format = "auto";  ///< one of layout_names()
   std::string camera;           ///< shipped name or file; "" = camera.yaml in the folder
   std::filesystem::path cameras_folder;
-  double max_pair_gap_s = 0.02;  ///< colour and depth further apart are no pair
+  double max_pair_gap_s = 0.02;  ///< largest gap between colour and depth of a pair
   double from_s = 0.0;           ///< seconds after the first pair
   double to_s = 1e300;           ///< seconds after the first pair
   int every = 1;                 ///< every n-th pair
   PoseUse poses = PoseUse::kPrior;
-  TopicNames topics;  ///< of bags
+  TopicNames topics;  ///< topics of a bag
   LiveOptions live;
 };
 

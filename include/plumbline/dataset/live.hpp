@@ -15,9 +15,9 @@ namespace plumbline::dataset {
 bool is_live_address(const std::string& input);
 
 /// Finds the topics and the camera as in a bag (OpenOptions::topics over what is found), takes messages in a
-/// thread of its own, and pairs them by stamp. Frames that come while LiveOptions::most_waiting_bytes of
+/// thread of its own, and pairs them by stamp. Frames that arrive while LiveOptions::most_waiting_bytes of
 /// others wait are dropped before they get a number, as are those whose stamp is not later than the last
-/// one's; both are counted and told. The source ends when LiveOptions::stop says so or its time is over.
+/// one's; both are counted and reported. The source ends when LiveOptions::stop says so or its time is over.
 /// Only the last frames and those that were kept (FrameSource::keep) can be read. Errors: kInput (no camera
 /// within LiveOptions::patience: topics and types that were seen are named; no camera calibration),
 /// kUsage (options that make no sense for what is live; topics that are not certain), kOutput (the record).

@@ -19,17 +19,17 @@ struct LiveFramesOptions {
 
 /// One pair of images from a camera.
 struct LiveFrame {
-  double stamp = 0.0;                 ///< of colour, seconds
+  double stamp = 0.0;                 ///< stamp of colour, seconds
   std::optional<double> depth_stamp;  ///< as the camera stamps it, without its depth_delay_s; none: `stamp`
   /// CV_8UC3 (BGR) or CV_8UC1, of the camera's size.
   cv::Mat color;
   /// CV_16UC1 in units of 1 / depth_scale metres, or CV_32FC1 in metres, which are rounded to such units; 0
-  /// and what is not finite is no measurement. Of the depth camera's size.
+  /// and values that are not finite mean no measurement. Of the depth camera's size.
   cv::Mat depth;
   std::optional<geometry::Rigid3> odometry;  ///< world_from_camera by the recorder's own odometry
 };
 
-/// A frame of a recording, as the camera gave it: what LiveFrames of source.camera() makes the same frame of.
+/// A frame of a recording, as the camera gave it: LiveFrames of source.camera() makes the same frame from it.
 /// Errors (kInput): cannot be read, or the source has no stored images.
 core::Result<LiveFrame> stored_frame(const FrameSource& source, std::size_t index);
 

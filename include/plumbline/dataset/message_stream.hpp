@@ -37,7 +37,7 @@ class MessageStream {
   virtual void unsubscribe(const std::string& topic) = 0;
   /// The next message of any topic; none if none arrives in time.
   virtual std::optional<StreamMessage> next(std::chrono::milliseconds most) = 0;
-  /// Number of messages that came too fast for next(), or that the network reported as lost.
+  /// Number of messages that arrived too fast for next(), or that the network reported as lost.
   [[nodiscard]] virtual std::size_t lost() const = 0;
 };
 

@@ -92,8 +92,8 @@ struct CloudReport {
   /// Per point of the cloud as given, NaN where dropped; empty without reference.
   std::vector<float> error_m;
   std::vector<Eigen::Vector3f> reference_samples;  ///< samples at which completeness was measured
-  std::vector<Eigen::Vector3f> reference_normals;  ///< of each of them, zero = unknown; may be empty
-  std::vector<float> reference_error_m;            ///< of each of them
+  std::vector<Eigen::Vector3f> reference_normals;  ///< normal at each of them, zero = unknown; may be empty
+  std::vector<float> reference_error_m;            ///< error at each of them
   std::vector<std::string> warnings;
 };
 

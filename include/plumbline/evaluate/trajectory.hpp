@@ -51,7 +51,7 @@ struct RelativeError {
 struct ComponentReport {
   std::string name;
   std::size_t poses = 0;
-  std::optional<double> percent;  ///< of all frames; none: their number is not known
+  std::optional<double> percent;  ///< percentage of all frames; none: their number is not known
   Statistics ate_m;               ///< zero when too few poses have truth
 };
 
@@ -59,7 +59,7 @@ struct TrajectoryReport {
   TrajectoryAlignment align = TrajectoryAlignment::kSe3;
   geometry::Rigid3 truth_from_estimate;
   std::size_t estimated = 0;  ///< poses in the estimate
-  std::size_t matched = 0;    ///< of them with truth at their stamp
+  std::size_t matched = 0;    ///< number of these with truth at their stamp
   Statistics ate_m;
   Statistics rotation_deg;              ///< orientation error after the alignment
   std::array<Statistics, 3> axis_m;     ///< |error| along x, y, z
@@ -75,7 +75,7 @@ struct TrajectoryReport {
   /// From the first listed frame (without a list: from the first truth pose) to the first pose, >= 0. None
   /// when a list was given and none of its frames has a pose.
   std::optional<double> first_pose_s;
-  std::vector<ComponentReport> components;  ///< of a result folder that has any, by name
+  std::vector<ComponentReport> components;  ///< components of a result folder that has any, by name
   std::vector<PoseError> poses;             ///< matched poses, by time
   geometry::Trajectory truth;               ///< the whole truth, for drawing
   std::vector<std::string> warnings;        ///< one sentence each

@@ -23,7 +23,7 @@ struct WallPlanesOptions {
 struct WallPlane {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< towards the side that the points face
   double offset_m = 0.0;                              ///< normal . p of its points
-  double area_m2 = 0.0;                               ///< of its patches
+  double area_m2 = 0.0;                               ///< total area of its patches
   WallThickness thickness;                            ///< over its patches
   double straightness_mm = 0.0;  ///< RMS distance of its patches' main layers from the plane
   double slab_rms_mm = 0.0;      ///< RMS distance of all points in the slab: handles, frames and all

@@ -37,8 +37,8 @@ class PointGrid {
 
 struct FrameFeatures {
   std::vector<PointFeature> points;
-  std::vector<Descriptor256> descriptors;  ///< of points
-  std::vector<CornerPatch> patches;        ///< of points; no elements: not known
+  std::vector<Descriptor256> descriptors;  ///< descriptors of `points`
+  std::vector<CornerPatch> patches;        ///< patches of `points`; empty: not known
   std::vector<cv::Mat> levels;  ///< CV_8UC1, the image in each octave; empty once the frame is tracked
   std::shared_ptr<const PhotometricImage> photometric;  ///< for direct alignment; null once it is tracked
   /// Slant of the surface at each point: change of the inverse depth per pixel (1/m). No elements if not

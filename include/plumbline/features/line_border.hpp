@@ -2,7 +2,7 @@
 #pragma once
 
 // Frames of constant colour around an image (TUM's fr3 recordings have a black one, 1-3 px wide, at the
-// right and bottom): every detector takes them for edges.
+// right and bottom): every detector finds edges there.
 #include <opencv2/core/mat.hpp>
 
 namespace plumbline::features {

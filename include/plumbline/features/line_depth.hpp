@@ -27,7 +27,7 @@ struct Line3 {
   Eigen::Vector3d end = Eigen::Vector3d::Zero();
   EndpointNoise start_noise;
   EndpointNoise end_noise;
-  float inlier_share = 0.0F;  ///< of the depth samples along the segment
+  float inlier_share = 0.0F;  ///< share of inliers among the depth samples along the segment
   float coverage = 0.0F;      ///< share of the segment's length that has supporting depth
 };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Everything a frame's lines need: detection, descriptor, 3D.
+// Lines of a frame: detection, descriptors and 3D lines from depth.
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <vector>
@@ -23,7 +23,7 @@ struct LineOptions {
   LineDetectorOptions detector;
   LineDepthOptions depth;
 
-  /// Keys of the detector as they are, those of the depth fit with the prefix "depth_".
+  /// Declares the detector's options under their own keys, those of the depth fit with the prefix "depth_".
   void declare(core::OptionTable& table);
 };
 

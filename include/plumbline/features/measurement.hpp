@@ -3,8 +3,8 @@
 
 // Conversion between measurements and features. A measurement is a pixel of the picture as the lens showed
 // it, in the row in which the shutter read it, with the depth as the depth camera gave it. A feature is made
-// from it for a rectified image that was taken all at once. The conversion is only here, so that features
-// follow when the camera turns out to be different.
+// from it for a rectified image that was taken all at once. With this conversion features
+// can be updated when the camera is calibrated again.
 #include <Eigen/Core>
 #include <vector>
 
@@ -32,9 +32,9 @@ PixelDepth feature_of(const PixelDepth& measurement, const geometry::Vector6d& s
 double depth_rate(const Eigen::Vector3d& p, const Eigen::Vector3d& normal,
                   const geometry::Vector6d& velocity);
 
-/// Computes the features again for another camera. `velocity` (m/s, rad/s): present estimate of that of
-/// camera_from_world, in its own frame. `depth_rates` (m/s), one per point or none at all: rates at which the
-/// depth on their rays changes as the camera moves, needed if the delay of the depth image changes.
+/// Computes the features again for another camera. `velocity` (m/s, rad/s): current estimate of the velocity
+/// of camera_from_world, in its own frame. `depth_rates` (m/s), one per point or none at all: rates at which
+/// the depth on their rays changes as the camera moves, needed if the delay of the depth image changes.
 void recalibrate(FrameFeatures& features, const sensor::Recalibration& change,
                  const geometry::Vector6d& velocity, const std::vector<double>& depth_rates);
 

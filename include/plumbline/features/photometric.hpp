@@ -28,7 +28,7 @@ sensor::Pinhole photometric_camera(const sensor::Pinhole& camera, std::size_t le
 /// A point on a surface with its grey value and gradient.
 struct PhotometricSample {
   Eigen::Vector3f point = Eigen::Vector3f::Zero();     ///< camera frame, metres
-  float value = 0.0F;                                  ///< of the level's image
+  float value = 0.0F;                                  ///< grey value in the level's image
   Eigen::Vector2f gradient = Eigen::Vector2f::Zero();  ///< per pixel of the level
 };
 using PhotometricSamples = std::array<std::vector<PhotometricSample>, kPhotometricLevels>;

@@ -16,16 +16,16 @@ struct LineView {
   Rigid3 camera_from_world;
   Eigen::Vector2d start = Eigen::Vector2d::Zero();
   Eigen::Vector2d end = Eigen::Vector2d::Zero();
-  double sigma = 0.001;  ///< of an end across the segment, normalised: pixels / focal length
+  double sigma = 0.001;  ///< standard deviation of an end across the segment: pixels / focal length
 };
 
 struct LineTriangulationOptions {
   double min_angle_rad = 0.02;      ///< between the two interpretation planes that differ most
-  double min_depth_m = 0.1;         ///< of both ends, in every view
-  double max_depth_m = 30.0;        ///< of both ends, in the first view
+  double min_depth_m = 0.1;         ///< smallest depth of both ends, in every view
+  double max_depth_m = 30.0;        ///< largest depth of both ends, in the first view
   double max_relative_sigma = 0.1;  ///< standard deviation of an end's depth over that depth
-  double max_residual = 3.0;        ///< of each end from the line's image, standard deviations
-  double min_overlap = 0.3;         ///< of the image of the ends in each view with the segment seen there
+  double max_residual = 3.0;        ///< distance of each end from the line's image, standard deviations
+  double min_overlap = 0.3;         ///< overlap of the line's image between its ends with each view's segment
 };
 
 enum class LineTriangulationStatus {
@@ -38,7 +38,7 @@ enum class LineTriangulationStatus {
   kInconsistent        ///< the segments cannot be images of one 3D segment
 };
 
-/// `line`, `start`, `end` and the sigmas are set when ok() only.
+/// `line`, `start`, `end` and the sigmas are set only when ok().
 struct TriangulatedLine {
   LineTriangulationStatus status = LineTriangulationStatus::kTooFewViews;
   PluckerLine line;                                 ///< world frame, v a unit vector
@@ -47,7 +47,7 @@ struct TriangulatedLine {
   double start_sigma = 0.0;  ///< metres, standard deviation along the first view's rays
   double end_sigma = 0.0;
   double angle_rad = 0.0;  ///< between the two interpretation planes that differ most
-  double rms = 0.0;        ///< of the residuals, standard deviations; 0 for two views: they always meet
+  double rms = 0.0;  ///< RMS of the residuals, standard deviations; 0 for two views, whose planes always meet
 
   [[nodiscard]] bool ok() const { return status == LineTriangulationStatus::kOk; }
 };

@@ -2,8 +2,8 @@
 #pragma once
 
 // The camera from its own recordings: what focal length, readout, depth slope, depth delay, centre and
-// distortion explain best what the keyframes of finished maps saw. Something is believed only when it also
-// explains parts of the runs that it was not found from.
+// distortion explain best what the keyframes of finished maps saw. A value is used only if it also
+// explains parts of the runs that it was not estimated from.
 #include <string>
 #include <vector>
 
@@ -21,15 +21,15 @@ struct CalibrationRun {
   const maps::Map* map = nullptr;
   /// Every frame: the camera's motion and observations.
   const std::vector<maps::FramePose>* frames = nullptr;
-  sensor::Pinhole image;  ///< of the images that the features lie in
+  sensor::Pinhole image;  ///< camera of the images that the features lie in
 };
 
 /// One number of the camera.
 struct CameraFinding {
-  std::string name;  ///< as in camera.yaml
+  std::string name;  ///< key in camera.yaml
   double given = 0.0;
   double found = 0.0;
-  double sigma = 0.0;  ///< by leaving parts of the runs out, one at a time (jackknife)
+  double sigma = 0.0;  ///< standard deviation by leaving parts of the runs out, one at a time (jackknife)
   double gain = 0.0;   ///< relative reduction of the cost on held-out parts
   bool used = false;   ///< it is in `camera`
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// From when on two robots could have been found to have met.
+// Time from which the meeting of two robots could have been detected.
 #include <algorithm>
 #include <cstdint>
 #include <map>

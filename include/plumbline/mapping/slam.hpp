@@ -47,7 +47,7 @@ struct FrameReport {
   tracking::TrackState state = tracking::TrackState::kLost;
   core::KeyframeId reference;  ///< keyframe the pose is relative to
   core::KeyframeId keyframe;   ///< made of this frame; invalid: none
-  core::KeyframeId component;  ///< its root, when the frame was tracked; invalid: it stands in none
+  core::KeyframeId component;  ///< root of the component at the time of tracking; invalid: in none
   optimize::FamilySummary points;
   optimize::FamilySummary lines;
   optimize::FamilySummary surface;
@@ -64,8 +64,8 @@ struct FrameReport {
 /// Two components that were joined while the robot mapped.
 struct ComponentJoin {
   ComponentOverlap overlap;
-  double stamp = 0.0;         ///< of the keyframe that made it certain, seconds
-  std::size_t keyframes = 0;  ///< of the later component
+  double stamp = 0.0;         ///< stamp of the keyframe that made it certain, seconds
+  std::size_t keyframes = 0;  ///< number of keyframes of the later component
 };
 
 class Slam {

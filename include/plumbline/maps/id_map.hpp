@@ -98,7 +98,7 @@ class IdMap {
   static constexpr std::int32_t kIdsPerPage = 64;
   /// (robot, index / kIdsPerPage)
   using Page = std::pair<std::int32_t, std::int32_t>;
-  /// Number of times that anything was inserted, erased or handed out to be changed.
+  /// Number of times that anything was inserted, erased or given out to be changed.
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
   /// Pages in which that happened after revision() was `since`, in order.
   [[nodiscard]] std::vector<Page> changed_pages(std::uint64_t since) const {

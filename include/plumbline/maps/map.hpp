@@ -21,7 +21,7 @@ using core::KeyframeId;
 using core::LineId;
 using core::PointId;
 
-/// Landmarks that covisible keyframes share, at least (section 3.3 of the paper).
+/// Smallest number of landmarks that covisible keyframes share (section 3.3 of the paper).
 constexpr int kCovisible = 20;
 
 /// A piece of surface that a keyframe's depth image measured, in the keyframe's camera frame.
@@ -31,15 +31,15 @@ struct SurfaceSample {
   float sigma = 0.01F;                                ///< metres, along the normal
 };
 
-/// Measurements of a keyframe; they never change after creation, but patches are given up
-/// (kPatchedKeyframes).
+/// Measurements of a keyframe; they never change after creation, except that old patches are
+/// dropped (kPatchedKeyframes).
 struct Keyframe {
   KeyframeId id;
   std::int64_t frame_index = -1;
   double stamp = 0.0;      ///< seconds
   double turn_rate = 0.0;  ///< rad/s: how fast the camera turned; 0 when it takes all rows at once: no shear
-  /// The keyframe that the tracker followed when this one was made (invalid: it began a map), and how the two
-  /// lay to each other as the tracker saw it.
+  /// The keyframe that the tracker followed when this one was made (invalid: it began a map), and the
+  /// relative pose that the tracker measured.
   KeyframeId reference;
   geometry::Rigid3 camera_from_reference;
   /// Standard deviation of that where it is known worst; half as much in radians.
@@ -204,7 +204,7 @@ class Map {
   template <typename Id>
   void remove(Id id);
   /// Two landmarks that are one: `kept` takes the observations and counts of `gone`, which is removed. Where
-  /// one keyframe sees both, the feature of `kept` stays. Positions are the caller's business. Throws
+  /// one keyframe sees both, the feature of `kept` stays. The caller sets the position. Throws
   /// std::invalid_argument when both are the same.
   template <typename Id>
   void merge(Id kept, Id gone);
@@ -253,7 +253,7 @@ class Map {
   /// All edges by order of creation.
   [[nodiscard]] const std::map<std::uint64_t, SurfaceEdge>& edges() const { return edges_; }
 
-  /// Loops that were closed and are believed. Throws std::invalid_argument when both ends are one,
+  /// Loops that were closed and not rejected. Throws std::invalid_argument when both ends are one,
   /// std::out_of_range when one is not in the map.
   void set_loops(std::vector<LoopEdge> loops);
   [[nodiscard]] const std::vector<LoopEdge>& loops() const { return loops_; }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Maps given other numbers and other worlds, and put together as one.
+// Renumbers the robots of maps, moves maps to other worlds, and joins several as one.
 #include <cstdint>
 #include <map>
 #include <vector>
@@ -11,7 +11,7 @@
 
 namespace plumbline::maps {
 
-/// Depends on what the keyframes measured and on their poses, not on names and robots' numbers.
+/// Hash that depends on what the keyframes measured and on their poses, not on names and robots' numbers.
 std::uint64_t content_hash(const Map& map);
 
 /// The same map with other numbers for its robots; robots that are not named in `to` keep theirs.

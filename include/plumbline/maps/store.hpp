@@ -34,7 +34,7 @@ struct CameraVersion {
 /// and landmarks are those of the latest version; clouds and their surfaces are stored as they were read, and
 /// CameraHistory converts them to the latest version.
 struct RobotInfo {
-  std::int32_t number = 0;  ///< in the map's ids
+  std::int32_t number = 0;  ///< number in the map's ids
   std::string name;
   sensor::Camera camera;                     ///< the given one
   std::vector<CameraVersion> versions = {};  ///< refined versions in order; empty: none
@@ -94,7 +94,7 @@ struct StoredSurface {
 /// A cloud on its way into a store: bytes of cloud::encode_cloud.
 struct StoreCloud {
   KeyframeId keyframe;  ///< keyframe of the cloud; invalid: it is a frame's
-  FrameId frame;        ///< of a frame between keyframes
+  FrameId frame;        ///< frame of a cloud between keyframes
   std::shared_ptr<const std::vector<std::uint8_t>> bytes;
   std::shared_ptr<const StoredSurface> surface = nullptr;  ///< of a keyframe's cloud; null: none is kept
 };
@@ -111,7 +111,7 @@ struct StoreStep {
   /// Robot whose own map this is, besides those of others; -1: the map is the only one.
   std::int32_t robot = -1;
   std::shared_ptr<const MapChanges> map;  ///< since the last step's of this robot
-  std::vector<FramePose> frames;          ///< that came since
+  std::vector<FramePose> frames;          ///< frames since then
   std::vector<std::string> log;           ///< lines that came since
   std::vector<StoreCloud> clouds;
   std::vector<StorePicture> pictures = {};
@@ -133,12 +133,12 @@ class StoreWriter {
   /// Makes a new file. Errors (kOutput): it is there already, its folder is not there, disk full.
   static core::Result<StoreWriter> create(const std::filesystem::path& file, const StoreHeader& header,
                                           StoreUse use = StoreUse::kGrowing);
-  /// Goes on in a file that a run left, which gets today's format. Errors (kInput) as StoreReader::open;
-  /// (kOutput): it is in use.
+  /// Continues the file of an earlier run and converts it to the present format. Errors (kInput) as
+  /// StoreReader::open; (kOutput): it is in use.
   static core::Result<StoreWriter> resume(const std::filesystem::path& file);
   StoreWriter(StoreWriter&& other) noexcept;
   StoreWriter& operator=(StoreWriter&&) = delete;
-  /// Leaves one file, without a log beside it, unless another program is reading it.
+  /// Closes the store as a single file without a log beside it, unless another program is reading it.
   ~StoreWriter();
 
   /// One transaction: brings the file up to `map` and `frames`, in which `keyframe` is new, and adds the

@@ -84,11 +84,11 @@ class MapFollower {
 class StoreReplica {
  public:
   /// Continues an existing copy, or makes an empty one. What was not committed is lost. Errors (kOutput): it
-  /// cannot be made; (kInput): the file is no copy.
+  /// cannot be made; (kInput): the file is not a copy.
   static core::Result<StoreReplica> open(const std::filesystem::path& file);
   StoreReplica(StoreReplica&& other) noexcept;
   StoreReplica& operator=(StoreReplica&& other) noexcept;
-  /// Leaves a single file.
+  /// Closes the copy as a single file.
   ~StoreReplica();
 
   /// The copy equals the store up to these transactions.

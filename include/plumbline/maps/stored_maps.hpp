@@ -15,24 +15,24 @@ namespace plumbline::maps {
 
 /// One store. Its robots are renumbered so that no two stores have the same number.
 struct StoredPart {
-  std::string name;  ///< of its folder
+  std::string name;  ///< name of the store's folder
   StoredRun run;
-  std::vector<RobotInfo> robots;  ///< by this run's numbers; clouds are as the latest camera has them
-  StoredViews views = {};         ///< its clouds
+  std::vector<RobotInfo> robots;  ///< with the numbers of this run, without versions of cameras
+  StoredViews views = {};         ///< clouds of the store
 };
 
-/// A cloud that waits in a store.
+/// A cloud in a store.
 struct StoredCloud {
-  std::size_t part = 0;
-  std::size_t view = 0;  ///< of the part's views
+  std::size_t part = 0;  ///< index of the store
+  std::size_t view = 0;  ///< index into the store's views
 };
 
-/// Parts stand in an order that their contents decide: the one with most keyframes first. Robots are numbered
-/// in this order; of several with one name, later ones get a number behind it.
+/// Parts are ordered by their contents: the one with most keyframes first. Robots are numbered in this order;
+/// of several with the same name, later ones get a number appended (`name-2`).
 class StoredMaps {
  public:
-  /// `maps`: result folders, or files map.db. Errors (kInput): not there, no map.db, damaged, not finished,
-  /// without keyframes; (kUsage) the same map twice.
+  /// `maps`: result folders, or files map.db. Errors (kInput): missing, no map.db, damaged, not finished,
+  /// no keyframes; (kUsage) the same map twice.
   static core::Result<std::unique_ptr<StoredMaps>> open(const std::vector<std::filesystem::path>& maps,
                                                         const core::Executor& executor);
 
@@ -41,11 +41,11 @@ class StoredMaps {
   [[nodiscard]] const StoredViews& views_of(const StoredCloud& cloud) const {
     return parts_[cloud.part].views;
   }
-  /// Robots of all parts, by this run's numbers.
+  /// Robots of all parts, in the order of their numbers in this run.
   [[nodiscard]] const std::vector<RobotInfo>& robots() const { return robots_; }
   /// Error about a cloud that cannot be used.
   [[nodiscard]] core::Error damaged(core::KeyframeId id, FrameId frame, const core::Error& how) const;
-  /// The part of that name, or that has a robot of that name. Errors (kUsage): none has.
+  /// The part that has this name, or a robot of this name. Errors (kUsage): there is none.
   [[nodiscard]] core::Result<std::size_t> find_part(const std::string& name) const;
 
  private:

@@ -22,13 +22,13 @@ struct FusionState;
 
 /// A map as the user named it.
 struct MapPlace {
-  std::optional<ResultFolder> result;  ///< of a run that came to its end
+  std::optional<ResultFolder> result;  ///< result of a run that has ended
   std::filesystem::path store;  ///< its map.db, or that of a run that was interrupted; empty: there is none
   std::string robot = {};       ///< robot whose map it is, if those of several are not merged yet
 };
 
 /// `input`: a result folder, map.db itself, or OUT where a run was interrupted and left OUT.partial. Errors
-/// (kInput): nothing of these.
+/// (kInput): none of these.
 core::Result<MapPlace> find_map(const std::filesystem::path& input);
 
 /// A run in its store, finished or interrupted, as it was when it was opened. Paths, lines and the fused
@@ -44,7 +44,7 @@ class StoredRun {
     return open_main(place.store, place.robot);
   }
 
-  /// Gives the robots of its map other numbers.
+  /// Renumbers the robots of its map.
   void renumber(const RobotNumbers& numbers);
 
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }

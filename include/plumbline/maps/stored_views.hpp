@@ -52,7 +52,7 @@ core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& ma
                                    const std::vector<RobotInfo>& robots, const Arrivals& arrivals = {},
                                    const RobotNumbers& numbers = {});
 
-/// The cloud of each keyframe as FOLDER/<number, six digits>.ply, laid by `output_from_map`; makes the
+/// The cloud of each keyframe as FOLDER/<number, six digits>.ply, transformed by `output_from_map`; makes the
 /// folder. `read`: a view's cloud. Returns how many. Errors (kOutput), those of `read`.
 core::Result<std::size_t> write_keyframe_clouds(
     const std::filesystem::path& folder, const StoredViews& views, const geometry::Rigid3& output_from_map,

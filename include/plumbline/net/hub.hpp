@@ -23,13 +23,13 @@ struct RobotTraffic {
   std::size_t keyframes = 0;
   bool complete = false;             ///< its run came to an end
   bool done = false;                 ///< the hub holds everything that it has
-  std::uint64_t received_bytes = 0;  ///< of rows, in this process
+  std::uint64_t received_bytes = 0;  ///< bytes of rows received by this process
   std::uint64_t place_bytes = 0;     ///< by purpose: features and poses of keyframes,
   std::uint64_t map_bytes = 0;       ///< landmarks, edges and frames,
   std::uint64_t cloud_bytes = 0;     ///< clouds
   std::uint64_t again_bytes = 0;     ///< received more than once
-  double longest_break_s = 0.0;      ///< without any message from it
-  double lag_median_s = 0.0;         ///< from a transaction in its store to the acknowledgement
+  double longest_break_s = 0.0;      ///< longest time without any message from the robot, seconds
+  double lag_median_s = 0.0;         ///< time from a transaction in its store to the acknowledgement
   double lag_p95_s = 0.0;
 };
 
@@ -46,7 +46,7 @@ struct HubRequest {
   std::function<void(const std::string& robot, const geometry::Rigid3& shared_from_robot)> placed;
 };
 
-/// Receives a line for people whenever there is something new.
+/// Receives a line of text for the user whenever the status changes.
 using Status = std::function<void(const std::string&)>;
 
 /// Collects until all robots are done or `stop` is requested, then fuses the received maps. The summary's

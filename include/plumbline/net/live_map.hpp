@@ -22,7 +22,7 @@ class LiveMap {
   ~LiveMap();  ///< tells the page that the run has ended
 
   [[nodiscard]] std::string address() const;
-  /// One line for people, shown under the map. Thread-safe.
+  /// Shows one line of text under the map. Thread-safe.
   void tell(const std::string& words);
   /// The pose of a robot's map in the frame that it shares with others: of the store robots/NAME/map.db.
   /// Thread-safe.

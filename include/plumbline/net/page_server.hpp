@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// One page over HTTP, and what is new as a stream of server-sent events; for browsers on this machine unless
-// told otherwise.
+// One page over HTTP, and what is new as a stream of server-sent events; by default for browsers on this
+// machine only.
 #include <cstddef>
 #include <memory>
 #include <string>
@@ -20,7 +20,7 @@ struct PageServerOptions {
 /// "HOST:PORT", "HOST" or "PORT"; [::1] in brackets. Errors (kUsage).
 core::Result<PageServerOptions> page_server_options(const std::string& address, const std::string& token);
 
-/// Limits of a server, whatever comes: connections at once (the rest are closed unread); event streams;
+/// Limits of a server: connections at once (the rest are closed unread); event streams;
 /// threads for pages besides them; events that wait for a slow stream, which loses the oldest beyond.
 struct PageServerLimits {
   static constexpr std::size_t kSockets = 32;
@@ -34,7 +34,7 @@ struct PageServerLimits {
 /// complete within a second. Thread-safe; send() never waits for a client.
 class PageServer {
  public:
-  /// Errors (kUsage): the address cannot be listened at; (kInternal): the part is missing.
+  /// Errors (kUsage): the server cannot listen at the address; (kInternal): the part is missing.
   static core::Result<PageServer> start(const PageServerOptions& options, std::string page);
   PageServer(PageServer&& other) noexcept;
   PageServer& operator=(PageServer&&) = delete;

@@ -22,9 +22,9 @@ struct RobotRequest {
   std::string name;
   NetworkOptions network;
   bool feedback = false;       ///< use maps of other robots for relocalisation and loops
-  double wait_s = 30.0;        ///< after the last frame, for a hub to answer at all
-  double wait_lost_s = 600.0;  ///< since the last acknowledgement of a hub that has answered
-  std::string fresh_id;        ///< made up at random, 16 letters or digits
+  double wait_s = 30.0;        ///< time to wait after the last frame for a hub to answer
+  double wait_lost_s = 600.0;  ///< time to wait since the last acknowledgement of a hub that has answered
+  std::string fresh_id;        ///< random id, 16 letters or digits
   std::string hand_in;         ///< arguments of the command that sends the map later, without the folder
 };
 

@@ -29,12 +29,12 @@ core::Result<std::unique_ptr<dataset::MessageStream>> open_ros2_stream(const Ros
 core::Result<std::unique_ptr<dataset::MessageSink>> open_ros2_sink(const Ros2Address& address);
 
 enum class PublishedNames {
-  kOfOne,   ///< of a robot alone nothing stands in front of topics and frames, of several their names
-  kOfEach,  ///< every robot's name stands there: others may join it
+  kOfOne,   ///< no prefix to topics and frames for a single robot, else the robots' names
+  kOfEach,  ///< always the robot's name as prefix, because others may join
 };
 
-/// Publishes what comes of a run, as long as the result lives, in a thread of its own; a listener that is too
-/// slow misses messages and holds up nothing. `name`: what stands there in any case, or "". Topics are
+/// Publishes the results of a run, as long as the returned object lives, in a thread of its own; a subscriber
+/// that is too slow misses messages and delays nothing. `name`: prefix in any case, or "". Topics are
 /// /plumbline/path (the poses of the keyframes, at the end of all frames), /plumbline/points (the cloud of
 /// each keyframe) and /plumbline/map (the merged cloud, at the end), of a robot or of each of several
 /// /NAME/..., and /tf: map -> odom -> camera, with NAME/ in front. In the frame map x points forward, y left,
@@ -45,7 +45,7 @@ core::Result<std::shared_ptr<pipeline::RunObserver>> open_ros2_publisher(const s
                                                                          const std::string& name,
                                                                          core::Log& log);
 
-/// For LiveOptions::open: opens the stream of an address; the topics that it names replace those given.
+/// Function for LiveOptions::open: opens the stream of an address, whose topics replace the given ones.
 core::Result<std::unique_ptr<dataset::MessageStream>> open_live_stream(const std::string& address,
                                                                        dataset::TopicNames& topics);
 

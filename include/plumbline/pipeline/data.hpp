@@ -69,7 +69,7 @@ struct RobotMaps {
   std::vector<FrameRow> frames;  ///< as MapResult
 };
 
-/// The finished map but for its dense cloud; poses after all optimisation.
+/// The finished map without its dense cloud; poses after all optimisation.
 struct MapResult : maps::MapPoses {
   std::shared_ptr<const maps::Map> map;             ///< null when the poses come from a file
   std::vector<maps::FramePose> frame_poses;         ///< empty when `map` is null
@@ -92,7 +92,7 @@ struct KeyframeCloud {
   maps::FrameId frame;    ///< as TrackedFrame
   double stamp = 0.0;     ///< seconds
   cloud::CloudPtr cloud;  ///< null: the content of `compact` is not decoded
-  /// The cloud as encoded by cloud::encode_cloud; null: it waits in a store.
+  /// The cloud as encoded by cloud::encode_cloud; null: it is in a store.
   std::shared_ptr<const std::vector<std::uint8_t>> compact;
   std::function<core::Result<std::vector<std::uint8_t>>()> stored;  ///< reads it there
   /// mapping::coarse_surface of the keyframe's cloud; null: none was kept.
@@ -121,7 +121,7 @@ struct DenseCloud {
 /// The poses of one robot among `map.trajectory`.
 geometry::Trajectory trajectory_of(const MapResult& map, std::int32_t robot);
 
-/// Trajectory, keyframe poses and lines of `result` as its map says now.
+/// Recomputes trajectory, keyframe poses and lines of `result` from its map.
 void take_poses_from_map(MapResult& result);
 
 /// The port types of this library.

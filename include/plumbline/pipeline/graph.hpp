@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A pipeline file as a checked graph of stages. docs/guide/pipelines.md tells users what may stand in one.
+// A pipeline file as a checked graph of stages. docs/guide/pipelines.md describes pipeline files.
 //
 //   description: what this pipeline is for
 //   include: rgbd.yaml                   # begin with the stages of another file
@@ -44,7 +44,7 @@ struct Node {
 /// Checked: every stage type known, every required input connected to a port of its type, no cycle, one
 /// source, nothing unused, every option in range, every file written once.
 struct Graph {
-  std::filesystem::path file;  ///< that it was read from
+  std::filesystem::path file;  ///< file that it was read from
   std::string description;
   std::vector<Node> nodes;  ///< each after all it reads from; otherwise in file order, taps last
 

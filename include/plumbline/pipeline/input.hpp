@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Kinds of INPUT of the commands.
+// Opens the INPUT of a command, whatever its kind.
 #include <filesystem>
 #include <memory>
 #include <string>

@@ -21,8 +21,8 @@ struct Meeting {
   int number = 0;  ///< from 1 on
   std::string a;
   std::string b;
-  double time_s = 0.0;     ///< of the recordings
-  std::int64_t frame = 0;  ///< of the run
+  double time_s = 0.0;     ///< time in the recordings
+  std::int64_t frame = 0;  ///< number of the frame in the run
   bool taken_back = false;
 };
 
@@ -31,7 +31,7 @@ class MeetingLog {
   /// Folders are made below `output`/meetings.
   MeetingLog(std::filesystem::path output, core::Log& log) : output_(std::move(output)), log_(&log) {}
 
-  /// `names`: by robot. `when`: for people, such as "after 3.2 s"; `time_s`: of the recordings, negative:
+  /// `names`: by robot. `when`: text such as "after 3.2 s"; `time_s`: time in the recordings, negative:
   /// there is none. Errors (kOutput): the meeting's folder cannot be written.
   core::Result<void> note(const mapping::MeetingEvent& event, const std::vector<std::string>& names,
                           const std::string& when, double time_s);

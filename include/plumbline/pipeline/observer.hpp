@@ -17,7 +17,7 @@ namespace plumbline::pipeline {
 class RunObserver {
  public:
   virtual ~RunObserver() = default;
-  /// Called first, and whenever a robot joins: the robots, by number.
+  /// Called first, and whenever a robot joins; the robots' names, by number.
   virtual void begins(const std::vector<std::string>& /*robots*/) {}
   /// For several robots: the pose of one robot's map in the frame that it shares with others.
   virtual void placed(std::int32_t /*robot*/, double /*stamp*/, const geometry::Rigid3& /*shared_from_map*/) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Reference of the stages for people and editors, made from their own declarations.
+// Reference of the stages for users and editors, made from the stages' declarations.
 #include <string>
 #include <vector>
 
@@ -14,7 +14,7 @@ namespace plumbline::pipeline {
 /// written twice) is beyond a schema and left to load_graph.
 std::string pipeline_schema(const StageRegistry& registry);
 
-/// The same of one stage's map.
+/// Schema of one stage's map.
 std::string stage_schema(const StageType& type, const StageRegistry& registry);
 
 /// Options of one stage that are shown, in the order of their declaration; `all`: the advanced ones, too.

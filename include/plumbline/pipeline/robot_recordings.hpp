@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// One recording or several side by side, each of a robot of its own, as one source of frames.
+// One or several recordings, each of a robot of its own, as one source of frames.
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -13,12 +13,12 @@
 
 namespace plumbline::pipeline {
 
-/// Frames come in the order of their stamps, ties by robot. Recordings that do not overlap in time are laid
-/// side by side: then the seconds since each one's first frame count.
+/// Frames come in the order of their stamps, ties by robot. If recordings do not overlap in
+/// time, the seconds since each one's first frame are used instead.
 class RobotRecordings : public dataset::FrameSource {
  public:
-  /// One recording a robot, numbered in this order; of several with one name, later ones get a number behind
-  /// it. Throws std::invalid_argument without recordings, or when one of several is live.
+  /// One recording per robot, numbered in this order; of several with the same name, later ones get a number
+  /// appended. Throws std::invalid_argument without recordings, or when one of several is live.
   explicit RobotRecordings(std::vector<std::unique_ptr<dataset::FrameSource>> recordings);
 
   [[nodiscard]] const std::vector<RobotInfo>& robots() const { return robots_; }
@@ -26,16 +26,16 @@ class RobotRecordings : public dataset::FrameSource {
     return robots_.at(static_cast<std::size_t>(number));
   }
   [[nodiscard]] std::int32_t robot_of(std::size_t index) const { return place(index).robot; }
-  /// Its number within its recording, and how many that has.
+  /// Number of the frame within its recording.
   [[nodiscard]] std::size_t frame_of(std::size_t index) const { return place(index).index; }
   [[nodiscard]] std::size_t frames_of(std::int32_t robot) const {
     return recordings_[static_cast<std::size_t>(robot)]->size();
   }
-  /// Seconds since the run began, of a frame.
+  /// Time of a frame, seconds since the run began.
   [[nodiscard]] double time_of(std::size_t index) const { return place(index).time; }
 
-  /// Frames from `from` on are read as taken by these cameras, one a robot, and rectified into images of
-  /// robot(...).camera all the same. Of sources that cannot, nothing changes. Beside read().
+  /// Frames from `from` on are read as taken by these cameras, one per robot, and still rectified into images
+  /// of robot(...).camera. Sources that cannot do so stay unchanged. May run at the same time as read().
   void correct(std::size_t from, const std::vector<sensor::Camera>& cameras);
 
   /// A robot's recording as taken by another camera, rectified into the same images; null: it cannot be.
@@ -52,7 +52,7 @@ class RobotRecordings : public dataset::FrameSource {
   }
   [[nodiscard]] dataset::PairInfo info(std::size_t index) const override;
   [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override;
-  /// One recording alone may be live.
+  /// True if the recording is live, which only a single one may be.
   [[nodiscard]] bool live() const override { return recordings_.front()->live(); }
   void wait_for(std::size_t index, std::chrono::milliseconds most) const override {
     recordings_.front()->wait_for(index, most);
@@ -61,7 +61,7 @@ class RobotRecordings : public dataset::FrameSource {
   void keep(std::size_t index) const override { recordings_.front()->keep(index); }
   void release(std::size_t index) const override { recordings_.front()->release(index); }
   [[nodiscard]] bool given_up() const override { return recordings_.front()->given_up(); }
-  /// The last one of its robot.
+  /// True if the frame is the last one of its robot.
   [[nodiscard]] bool is_last(std::size_t index, const core::StopToken& stop) const override {
     return recordings_[static_cast<std::size_t>(robot_of(index))]->is_last(frame_of(index), stop);
   }

@@ -30,7 +30,7 @@ struct RunRequest {
 };
 
 struct RunReport {
-  std::size_t frames = 0;  ///< that went through the graph
+  std::size_t frames = 0;  ///< number of frames that passed the graph
   std::size_t frames_available = 0;
   bool stopped = false;  ///< ended early on request
   /// First frame read to last change of the map: frames and the end of non-export stages.
@@ -44,16 +44,16 @@ struct RunReport {
 /// Called in frame order, from one thread at a time; `total` 0: not known (live sources).
 using Progress = std::function<void(std::size_t done, std::size_t total)>;
 
-/// With a pace (`pace_hz` > 0) frame n of a recording is handed out no earlier than n / pace_hz seconds
-/// after the first frame, as a live camera would; several recordings are played together. Only when things
-/// happen depends on it.
+/// With a pace (`pace_hz` > 0) frame n of a recording enters the graph no earlier than n / pace_hz seconds
+/// after the first frame, as a live camera would; several recordings are played together. Results do not
+/// depend on it.
 ///
-/// Frames travel the stages in graph order; several are under way at a time, never more than twice the
-/// threads plus two, so that memory stays bounded. Stateless stages work side by side, serial stages see the
-/// frames in order: results do not depend on the number of threads. The run ends early, in order, when the
-/// context's stop token says so (stages still finish) or when a stage fails: then the error of the earliest
-/// such frame is returned and no stage finishes. A run that goes on from another begins with the frame after
-/// the last one of that; the report counts those, too, but has no times of them.
+/// Frames pass the stages in graph order; several are processed at a time, never more than twice the threads
+/// plus two, so that memory stays bounded. Stateless stages run in parallel, serial stages get the frames in
+/// order: results do not depend on the number of threads. The run ends early, in order, when the
+/// context's stop token requests it (stages still finish) or when a stage fails: then the error of the
+/// earliest such frame is returned and no stage finishes. A run that continues another one begins with the
+/// frame after the last one of that; the report counts its frames, too, but without times.
 core::Result<RunReport> run_graph(Graph& graph, const RunContext& context, const Progress& progress,
                                   double pace_hz = 0.0);
 

@@ -7,7 +7,7 @@
 //   read ──frame──▶ features ──features──▶ track ──track──▶ cloud ──keyframe_cloud──▶ fuse ──cloud──▶ output
 //
 // Adding a stage: derive from Stage in src/pipeline/stages/stage_<name>.cpp, describe it in a StageType, add
-// one line to register_stages() (src/pipeline/stages/registry.cpp). A new port type wants a tap as well
+// one line to register_stages() (src/pipeline/stages/registry.cpp). A new port type needs a tap as well
 // (src/pipeline/taps/tap_<name>.cpp).
 #include <cstddef>
 #include <filesystem>
@@ -54,7 +54,7 @@ class RobotRecordings;
 
 /// Rate at which a port carries values.
 enum class Rate {
-  kFrame,  ///< once a frame, or nothing for a frame (unreadable, no keyframe ...)
+  kFrame,  ///< once per frame; some frames have no value (unreadable, no keyframe ...)
   kEnd,    ///< once, after the last frame
 };
 
@@ -77,7 +77,7 @@ PortType port_type(std::string name, Rate rate = Rate::kFrame) {
 struct Port {
   std::string name;
   PortType type;
-  bool required = true;  ///< of inputs: must be connected, and hold a value for the stage to be called
+  bool required = true;  ///< input that must be connected, and hold a value for the stage to be called
 };
 
 using Value = std::shared_ptr<const void>;
@@ -120,7 +120,7 @@ class StageIo {
   std::vector<Value> out_;
 };
 
-/// Frames under way side by side, at most, whatever the number of threads.
+/// Largest number of frames processed at the same time, for any number of threads.
 constexpr std::size_t kMostUnderWay = 64;
 
 /// Input of a run.
@@ -128,16 +128,16 @@ struct RunInput {
   const dataset::FrameSource* source = nullptr;          ///< input of a read stage; null: there is none
   RobotRecordings* recordings = nullptr;                 ///< `source`, when recordings are mapped; else null
   const maps::StoredMaps* stored_maps = nullptr;         ///< input of a maps stage; null: there is none
-  const std::vector<maps::RobotInfo>* robots = nullptr;  ///< of recordings or maps, by number
+  const std::vector<maps::RobotInfo>* robots = nullptr;  ///< robots of the recordings or maps, by number
   std::string anchor;  ///< robot that defines the common frame of finished maps; empty: any
   std::string text;    ///< text that identifies what is mapped
 };
 
 /// Data kept in map.db.
 struct RunStore {
-  std::string configuration;  ///< the effective one, YAML; the same for any number of threads
-  bool keeps_map = false;     ///< some stage keeps_map
-  bool keeps_clouds = false;  ///< and that stage gets the clouds to be fused
+  std::string configuration;  ///< effective configuration, YAML; the same for any number of threads
+  bool keeps_map = false;     ///< true if a stage has keeps_map()
+  bool keeps_clouds = false;  ///< true if that stage also gets the clouds to be fused
 };
 
 /// Hooks of callers that change a run or observe it.
@@ -182,22 +182,22 @@ struct Doubt {
 /// Times of one stage, milliseconds.
 struct StageTiming {
   std::string name;
-  std::vector<float> frame_ms;  ///< one per frame; NaN = the stage had nothing to do
+  std::vector<float> frame_ms;  ///< one per frame; NaN: the stage had nothing to do
   double finish_ms = 0.0;
 
-  [[nodiscard]] double quantile_ms(double q) const;  ///< over the frames it worked on; 0 when there are none
+  [[nodiscard]] double quantile_ms(double q) const;  ///< over the frames that the stage processed; 0: none
 };
 
 /// Information that a stage may use while the graph is checked.
 struct CheckContext {
-  std::filesystem::path pipeline_folder;           ///< of the pipeline file
+  std::filesystem::path pipeline_folder;           ///< folder of the pipeline file
   std::filesystem::path pipelines_folder;          ///< shipped pipelines, filters and cameras
   const cloud::FilterRegistry* filters = nullptr;  ///< filters that chains may contain
 
   /// A file named in a pipeline: absolute, beside the pipeline file, or shipped. Empty when there is none.
   [[nodiscard]] std::filesystem::path find(const std::string& file) const;
-  /// Resolves a file for a value of an included pipeline beside that one, and for --set first in the working
-  /// directory.
+  /// The same for a value that was set at `mark`: a value of an included pipeline is searched beside that
+  /// pipeline first, a value of --set in the working directory first.
   [[nodiscard]] std::filesystem::path find(const std::string& file, const core::ConfigMark& mark) const;
 };
 
@@ -222,18 +222,18 @@ class Stage {
   /// Number of frames of a source; called after start.
   [[nodiscard]] virtual std::size_t frames() const { return 0; }
   /// One frame, when all required per-frame inputs hold a value. Stateless stages are called from several
-  /// threads at a time and in any order, serial ones in frame order. An error ends the run; what concerns
-  /// this frame only is not an error here: log it and leave the outputs out.
+  /// threads at a time and in any order, serial ones in frame order. An error ends the run; a problem
+  /// of this frame only is logged, and the outputs are not set.
   virtual core::Result<void> process(StageIo& /*io*/) { return {}; }
-  /// After the last frame, in graph order; reads and writes the ports of Rate::kEnd. Stages that export and
-  /// do not need one another finish side by side.
+  /// Called after the last frame, in graph order; reads and writes the ports of Rate::kEnd. Stages that
+  /// export and do not need one another finish at the same time.
   virtual core::Result<void> finish(StageIo& /*io*/) { return {}; }
   /// Exports to make from the result folder once everything else in it is written, in the formats of
   /// plumbline export; outputs are named below it. Called after check. Null: none.
   [[nodiscard]] virtual const std::vector<exports::ExportRequest>* wanted_exports() const { return nullptr; }
   /// Fills in what this stage knows in the sections of summary.json; in graph order.
   virtual void report(nlohmann::ordered_json& /*summary*/) const {}
-  /// Adds why the result must not be trusted, as far as this stage knows. `summary`: what all have reported.
+  /// Adds this stage's reasons why the result must not be trusted. `summary`: the reports of all stages.
   virtual void doubt(const nlohmann::ordered_json& /*summary*/, std::vector<Doubt>& /*reasons*/) const {}
   /// Times of parts of this stage's work, named "stage.part".
   [[nodiscard]] virtual std::vector<StageTiming> parts() const { return {}; }
@@ -243,14 +243,14 @@ class Stage {
   [[nodiscard]] virtual bool resumes() const { return false; }
   /// True if poses that come with the recording are used unchanged. Called before the run.
   [[nodiscard]] virtual bool takes_given_poses() const { return false; }
-  /// Asked before the run: it begins with finished maps (RunInput::stored_maps).
+  /// True if it begins with finished maps (RunInput::stored_maps). Called before the run.
   [[nodiscard]] virtual bool reads_maps() const { return false; }
-  /// Asked before the run: clouds wait for it in a store until their poses are final.
+  /// True if its clouds are kept in a store until their poses are final. Called before the run.
   [[nodiscard]] virtual bool lays_clouds_down() const { return false; }
 };
 
 enum class Mode {
-  kStateless,  ///< frames side by side
+  kStateless,  ///< several frames at the same time
   kSerial,     ///< one frame after another, in order
 };
 
@@ -263,7 +263,7 @@ struct StageType {
   std::function<std::unique_ptr<Stage>()> make;
   bool exports = false;  ///< writes results after the map is complete; its time counts as export
 
-  /// Gives frames without taking any.
+  /// True if it has per-frame outputs but no per-frame inputs.
   [[nodiscard]] bool is_source() const;
   /// Options of a newly made stage.
   [[nodiscard]] std::vector<core::OptionSpec> options() const;

@@ -9,7 +9,7 @@ namespace plumbline::pipeline {
 struct RunSummary {
   std::string reason;  ///< reason not to trust the result; empty: there is none
   std::string json;    ///< summary.json (docs/reference/files.md)
-  std::string text;    ///< a few lines for people
+  std::string text;    ///< a few lines of text for the user
 };
 
 /// Most memory this process ever held, MB.

@@ -13,24 +13,24 @@
 
 namespace plumbline::places {
 
-/// The tag that keeps points and lines apart.
+/// Kind of a feature: points and lines have separate trees.
 enum class Kind : std::uint8_t { kPoint = 0, kLine = 1 };
 constexpr std::array<Kind, 2> kKinds{Kind::kPoint, Kind::kLine};
 
-/// Index of a node of either tree. Those that are leaves are the words of today.
+/// Index of a node of either tree; the leaves are the present words.
 using Word = std::int32_t;
 
 struct VocabularyOptions {
-  int branching = 10;  ///< k: children of a node at most
-  int levels = 6;      ///< d: words are at most so deep
+  int branching = 10;  ///< k: largest number of children of a node
+  int levels = 6;      ///< d: largest depth of a word
   int split = 20;      ///< a word with more features than this is divided
-  int iterations = 5;  ///< of k-majority
+  int iterations = 5;  ///< iterations of k-majority
   void declare(core::OptionTable& table);
 };
 
 class Vocabulary {
  public:
-  /// Knows one word for all points and one for all lines.
+  /// Begins with one word for all points and one for all lines.
   explicit Vocabulary(const VocabularyOptions& options = {});
 
   /// The word of a descriptor: down the tree, to the nearest child at each level.
@@ -39,7 +39,7 @@ class Vocabulary {
   [[nodiscard]] double weight(Word word) const;
   [[nodiscard]] bool is_word(Word node) const { return nodes_[static_cast<std::size_t>(node)].children == 0; }
 
-  /// One more feature in `word`.
+  /// Counts one more feature in `word`.
   void count(Word word);
   /// True if the word has become so common that it should be divided. Words near the root wait for more
   /// features, because their decision is final.
@@ -52,7 +52,7 @@ class Vocabulary {
   [[nodiscard]] std::size_t node_count() const { return nodes_.size(); }
   [[nodiscard]] std::size_t word_count(Kind kind) const;
   [[nodiscard]] std::int64_t feature_count(Kind kind) const;
-  [[nodiscard]] int depth(Kind kind) const;  ///< of the deepest word; 0: the root is the only word
+  [[nodiscard]] int depth(Kind kind) const;  ///< depth of the deepest word; 0: the root is the only word
 
  private:
   struct Node {
@@ -60,15 +60,16 @@ class Vocabulary {
     std::int16_t children = 0;
     std::int8_t level = 0;
     Kind kind = Kind::kPoint;
-    std::int64_t features = 0;  ///< of a word: n_w; of a root: of its whole tree
-    std::int64_t divide_at = 0;
+    std::int64_t features = 0;   ///< number of features: n_w of a word; a root's count is its whole tree's
+    std::int64_t divide_at = 0;  ///< number of features above which the word is divided
   };
   Word add_children(Word parent, const std::vector<features::Descriptor256>& centres);
+  /// Number of features that a word of this level may have.
   [[nodiscard]] std::int64_t patience(int level) const;
 
   VocabularyOptions options_;
   std::vector<Node> nodes_;  ///< 0 and 1 are the roots; children of a node lie side by side
-  std::vector<features::Descriptor256> centres_;  ///< by node
+  std::vector<features::Descriptor256> centres_;  ///< centre of each node
 };
 
 }  // namespace plumbline::places

@@ -45,8 +45,8 @@ struct Pinhole {
 struct Camera {
   std::string name;
   Pinhole color;
-  LensModel model = LensModel::kRadialTangential;  ///< of the colour image's lens
-  Distortion distortion{};                         ///< of the colour image; all 0 = none
+  LensModel model = LensModel::kRadialTangential;  ///< model of the colour image's lens
+  Distortion distortion{};                         ///< coefficients of the colour image; all 0 = none
   double depth_scale = 5000.0;                     ///< raw units per metre
   double fps = 30.0;
   /// Rolling shutter: from the first row of a colour image to the last, seconds; 0: all rows at once.
@@ -54,13 +54,13 @@ struct Camera {
   /// Pose of the depth camera, if depth is not registered to colour: the reader then registers it.
   std::optional<geometry::Rigid3> color_from_depth;
   std::optional<Pinhole> depth;  ///< intrinsics of the depth image when color_from_depth is present
-  Lens depth_lens;               ///< of the depth image when color_from_depth is present
+  Lens depth_lens;               ///< lens of the depth image when color_from_depth is present
   /// Error of depth across the image, 1/m: 1 / z = 1 / z_measured + depth_slope . (x, y) along the ray (x, y,
   /// 1) of the undistorted colour camera. It describes a depth camera whose axis is not where its maker
   /// thinks.
   std::array<double, 2> depth_slope{};
   double depth_delay_s = 0.0;  ///< delay of depth images after their stamps
-  bool guess = false;          ///< typical values, of no file
+  bool guess = false;          ///< typical values, not read from a file
 
   [[nodiscard]] Lens lens() const { return {model, distortion}; }
   [[nodiscard]] bool distorted() const { return lens().distorts(); }

@@ -14,8 +14,8 @@ namespace plumbline::sensor {
 /// camera Camera::color, pixel for pixel.
 struct RgbdFrame {
   std::int64_t index = -1;   ///< position in the recording
-  double stamp = 0.0;        ///< of colour, seconds
-  double depth_stamp = 0.0;  ///< of depth, seconds
+  double stamp = 0.0;        ///< stamp of colour, seconds
+  double depth_stamp = 0.0;  ///< stamp of depth, seconds
   cv::Mat color;             ///< CV_8UC3, BGR
   cv::Mat gray;              ///< CV_8UC1
   cv::Mat depth;             ///< CV_32FC1, metres along z, 0 = no measurement

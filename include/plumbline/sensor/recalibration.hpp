@@ -33,29 +33,28 @@ class ImageModel {
   Camera camera_;
 };
 
-/// Change of what a camera is believed to be, from `before` to `after`, for images of one pinhole. Const
-/// methods are thread-safe.
+/// Change of a camera's calibration, from `before` to `after`, for images of one pinhole. Const methods are
+/// thread-safe.
 class Recalibration {
  public:
   Recalibration(const Pinhole& image, const Camera& before, const Camera& after);
 
   [[nodiscard]] const ImageModel& before() const { return before_; }
   [[nodiscard]] const ImageModel& after() const { return after_; }
-  /// New position of what lay at a rectified pixel; by interpolation in a table, to a few thousandths of a
-  /// pixel.
+  /// New position of a rectified pixel's content, interpolated in a table to a few thousandths of a pixel.
   [[nodiscard]] Eigen::Vector2d pixel(const Eigen::Vector2d& rectified) const;
-  /// The depth (> 0) that was read at `before`, now that this is the pixel `now`. 0: none any more.
+  /// New depth of a pixel that had the depth z (> 0) at `before` and is now at `now`; 0 if none is left.
   [[nodiscard]] double depth(const Eigen::Vector2d& before, const Eigen::Vector2d& now, double z) const;
-  /// A place (camera frame, metres, z > 0) that the depth image measured. Where depth has a camera of its
-  /// own, the colour camera's lens does not move it.
+  /// New position of a point (camera frame, metres, z > 0) that the depth image measured. With a separate
+  /// depth camera, the colour camera's lens does not move it.
   [[nodiscard]] Eigen::Vector3d point(const Eigen::Vector3d& p) const;
-  /// The normal of a surface there, unit or zero: a slope of depth tilts it.
+  /// New normal of the surface there, unit or zero: a slope of depth tilts it.
   [[nodiscard]] Eigen::Vector3d normal(const Eigen::Vector3d& p, const Eigen::Vector3d& normal) const;
-  /// Additional delay of depth images relative to what was believed, seconds.
+  /// Additional delay of depth images relative to `before`, seconds.
   [[nodiscard]] double delay_s() const {
     return after_.camera().depth_delay_s - before_.camera().depth_delay_s;
   }
-  /// Neither pixels nor depths change: at most shutter and delay do.
+  /// True if neither pixels nor depths change; shutter and delay may.
   [[nodiscard]] bool keeps_images() const { return !moves_pixels_ && !moves_depth_; }
 
  private:
@@ -65,7 +64,7 @@ class Recalibration {
   bool moves_depth_ = false;
   int columns_ = 0;
   int rows_ = 0;
-  std::vector<Eigen::Vector2d> shifts_;  ///< of every kCell-th pixel, row by row
+  std::vector<Eigen::Vector2d> shifts_;  ///< shift of every kCell-th pixel, row by row
 };
 
 }  // namespace plumbline::sensor

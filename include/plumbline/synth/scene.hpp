@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A world as its YAML file describes it: flat faces, lamps and the ways robots take through it.
+// A world as its YAML file describes it: flat faces, lamps and the robots' paths through it.
 // World frame: metres, z up, the floor at z = 0 by custom.
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -54,7 +54,7 @@ struct Lamp {
 
 struct Waypoint {
   Eigen::Vector3d position;
-  std::optional<Eigen::Vector3d> look;  ///< point looked at; none = along the way
+  std::optional<Eigen::Vector3d> look;  ///< point looked at; none: along the path
   double pitch_rad = 0.0;               ///< added to the viewing direction, positive looks up
   double yaw_rad = 0.0;                 ///< added to the viewing direction, positive to the left
   core::ConfigMark mark;

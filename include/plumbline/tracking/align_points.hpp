@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Matched corners to a tenth of a pixel: aligned with what their landmark looked like when it was first seen.
+// Aligns matched corners, to a tenth of a pixel, with the patch of their landmark when it was first seen.
 #include <optional>
 #include <vector>
 

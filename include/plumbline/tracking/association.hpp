@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Which features of a frame are which landmarks of the local map, given a guess of the pose.
+// Associates features of a frame with landmarks of the local map, given a guess of the pose.
 #include <vector>
 
 #include "plumbline/core/options.hpp"
@@ -42,15 +42,15 @@ struct AssociationOptions {
   void declare(core::OptionTable& table);
 };
 
-/// Point landmarks by projection: within `radius` pixels (grown with the octave), of a fitting octave, seen
-/// from a fitting side, best and clearly better than the second best, each feature used once. `visible`
-/// receives the landmarks inside the view.
+/// Matches point landmarks by projection: within `radius` pixels (grown with the octave), of a fitting
+/// octave, seen from a fitting side, best and clearly better than the second best, each feature used once.
+/// `visible` receives the landmarks inside the view.
 std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<core::PointId>& points,
                                      const features::FrameFeatures& frame, const sensor::Pinhole& camera,
                                      const geometry::Rigid3& camera_from_world, double radius,
                                      const AssociationOptions& options, std::vector<core::PointId>* visible);
 
-/// Line landmarks by projection: near in distance and angle, overlapping, and alike in descriptor.
+/// Matches line landmarks by projection: near in distance and angle, overlapping, and alike in descriptor.
 std::vector<LineMatch> match_lines(const maps::Map& map, const std::vector<core::LineId>& lines,
                                    const features::FrameFeatures& frame, const sensor::Pinhole& camera,
                                    const geometry::Rigid3& camera_from_world, double radius,

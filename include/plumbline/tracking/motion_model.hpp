@@ -2,7 +2,7 @@
 #pragma once
 
 // Constant velocity on SE(3), or the recorder's own odometry: where the camera is expected at a time, and how
-// far that may be believed.
+// far that can be trusted.
 #include <algorithm>
 #include <optional>
 
@@ -23,38 +23,38 @@ class MotionModel {
   /// The motion of camera_from_world within `dt` seconds.
   [[nodiscard]] geometry::Rigid3 motion_within(double dt) const { return geometry::exp_se3(velocity_ * dt); }
 
-  /// A frame was tracked.
+  /// Updates the model with a tracked frame.
   void update(double stamp, const TrackResult& result);
-  /// A frame was not.
+  /// Updates the model with a lost frame.
   void lost();
   /// Takes back all poses found after the first `frames` lost ones.
   void lost_since(int frames) { lost_frames_ = frames; }
   /// Forgets the past, because the camera was found elsewhere.
   void reset();
-  /// Goes on from a keyframe, with this velocity of camera_from_world per second.
+  /// Continues from a keyframe, with this velocity of camera_from_world per second.
   void restore(double stamp, const geometry::Vector6d& velocity);
   /// Sets the new position of the last pose after a correction of the map.
   void set_camera_from_world(const geometry::Rigid3& pose) { camera_from_world_ = pose; }
   [[nodiscard]] const geometry::Rigid3& camera_from_world() const { return camera_from_world_; }
 
-  /// The frame before was tracked.
+  /// True if the previous frame was tracked.
   [[nodiscard]] bool continuous() const { return valid_ && lost_frames_ == 0; }
-  /// The velocity is known, and no frame is missing since.
+  /// True if the velocity is known, and no frame is missing since.
   [[nodiscard]] bool reliable(double stamp) const;
-  /// After a while without a pose the last one says little: surfaces near it fit by chance.
+  /// True after a while without a pose: surfaces near the last one fit by chance.
   [[nodiscard]] int lost_frames() const { return lost_frames_; }
   [[nodiscard]] bool outdated() const { return lost_frames_ >= (knows_odometry() ? 60 : 5); }
-  /// After some more it says nothing.
+  /// True after some more time without a pose: the last one is of no use.
   [[nodiscard]] bool expired() const { return lost_frames_ >= (knows_odometry() ? 300 : 30); }
   /// Radius of the search for features around their prediction, pixels.
   [[nodiscard]] double search_radius_px() const { return 12.0 + 4.0 * std::min(lost_frames_, 5); }
-  /// True if the motion model may still hold a direction that no measurement holds.
+  /// True if the motion model may still constrain a direction that no measurement constrains.
   [[nodiscard]] bool may_dead_reckon() const {
     return continuous() && dead_reckoning_s_ < (knows_odometry() ? 20.0 : 2.5);
   }
   /// True if odometry gives the motion from the last tracked frame to the present one.
   [[nodiscard]] bool knows_odometry() const { return valid_ && odometry_ && last_odometry_; }
-  /// Measurements have contradicted it since surfaces have been all but alone.
+  /// True if measurements have contradicted the model since little but surfaces was measured.
   [[nodiscard]] bool contradicted() const { return contradicted_; }
 
   [[nodiscard]] double last_stamp() const { return stamp_; }
@@ -70,7 +70,7 @@ class MotionModel {
   geometry::Rigid3 camera_from_world_;
   bool valid_ = false;
   geometry::Vector6d velocity_ = geometry::Vector6d::Zero();  ///< of camera_from_world, per second
-  int steps_ = 0;        ///< consecutive steps between frames from which the velocity was found
+  int steps_ = 0;        ///< number of consecutive steps from which the velocity was estimated
   double step_s_ = 0.0;  ///< duration of the last step
   int lost_frames_ = 0;
   double dead_reckoning_s_ = 0.0;  ///< time for which it has held unmeasured directions

@@ -15,7 +15,7 @@
 namespace plumbline::tracking {
 
 struct Relocalisation {
-  core::KeyframeId keyframe;  ///< that the frame looks like
+  core::KeyframeId keyframe;  ///< keyframe that the frame looks like
   geometry::Rigid3 camera_from_world;
   int inliers = 0;
 };
@@ -34,8 +34,8 @@ struct LookAlike {
   double correlation = 0.0;
 };
 
-/// Up to `count` of `candidates` that look like the image, most alike first. An image without contrast looks
-/// like nothing.
+/// Up to `count` of `candidates` that look like the image, most alike first. None for an image
+/// without contrast.
 std::vector<LookAlike> look_alikes(const maps::Map& map, const std::vector<core::KeyframeId>& candidates,
                                    const features::FrameFeatures& features, int count);
 

@@ -4,7 +4,7 @@
 // Pose of every frame against the map: predict, hypothesise, associate, estimate from points, lines, surfaces
 // and intensity together. docs/method/tracking.md; sections 3.1 and 3.2 of Xia, Wu, Ma, Zhu, Cheng, Zhu,
 // "Multi-Robot Collaborative Mapping with Integrated Point-Line Features for Visual SLAM", Sensors 2024,
-// 24(17), 5743. Sees a const map; what changes the map is in mapping.
+// 24(17), 5743. Reads a const map; the module mapping changes it.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -121,8 +121,8 @@ class Tracker {
   TrackResult begin_at(const geometry::Rigid3& camera_from_world, const sensor::RgbdFrame& frame,
                        const Features& features);
 
-  /// Goes on where another tracker left `map`: it had just tracked the keyframe `reference`, with this motion
-  /// of camera_from_world per second.
+  /// Continues where another tracker left `map`: it had just tracked the keyframe `reference`, with this
+  /// motion of camera_from_world per second.
   void restore(const maps::Map& map, core::KeyframeId reference, const geometry::Vector6d& velocity);
 
   /// Function that finds the keyframes of the map which look like an image, best first. Called when tracking
@@ -140,7 +140,7 @@ class Tracker {
 
   /// Pose of the last tracked frame, in the map as it is now.
   [[nodiscard]] const geometry::Rigid3& camera_from_world() const { return motion_.camera_from_world(); }
-  /// The last frame was lost, and several before it.
+  /// True if the last frame and several before it were lost.
   [[nodiscard]] bool astray() const { return motion_.outdated(); }
   /// The frames since `lost_frames` were lost are taken back: they are lost, too.
   void take_back(int lost_frames) { motion_.lost_since(lost_frames); }
@@ -165,7 +165,7 @@ class Tracker {
   /// Tracks from the predicted pose; none if no pose found there can be trusted.
   [[nodiscard]] std::optional<TrackResult> track_with_motion_model(
       const maps::Map& map, const sensor::RgbdFrame& frame, const features::FrameFeatures& features) const;
-  /// From what the image looks like; the local map moves there.
+  /// Finds the pose by the image's appearance; the local map moves there.
   [[nodiscard]] std::optional<TrackResult> relocalise(const maps::Map& map, const sensor::RgbdFrame& frame,
                                                       const features::FrameFeatures& features);
   void record(const sensor::RgbdFrame& frame, TrackResult& result);

@@ -18,7 +18,7 @@ struct PointXYZRGBNormal;
 
 namespace plumbline::viz {
 
-/// The way of one camera: a line with a mark at its start (ring) and at its end (disc).
+/// The path of one camera: a line with a mark at its start (ring) and at its end (disc).
 struct CameraPath {
   std::string name;                 ///< shown in the legend; empty = not listed
   geometry::Trajectory trajectory;  ///< world_from_camera; camera axes x right, y down, z forward
@@ -31,14 +31,14 @@ struct Segment {
 };
 
 struct Scene {
-  /// May be null or empty. Points with a non-finite coordinate are passed over. Normals point to the side
+  /// May be null or empty. Points with a non-finite coordinate are skipped. Normals point to the side
   /// the surface was seen from; a zero or non-finite normal means "not known".
   std::shared_ptr<const pcl::PointCloud<pcl::PointXYZRGBNormal>> cloud;
   /// One value per point, or empty: robot index for ColorMode::kRobot, metres for kError, any number for
   /// kConfidence. Non-finite = no value (grey).
   std::vector<float> scalars;
-  std::string scalar_label;              ///< beside the colour bar, with its unit: "error (mm)"
-  std::vector<std::string> robot_names;  ///< legend of ColorMode::kRobot, by robot index
+  std::string scalar_label;              ///< label of the colour bar, with the unit: "error (mm)"
+  std::vector<std::string> robot_names;  ///< names in the legend of ColorMode::kRobot, by robot index
   std::vector<CameraPath> paths;
   std::vector<Segment> segments;  ///< 3D line landmarks
   Rgb segment_color{200, 30, 60};

@@ -37,7 +37,7 @@ struct SvgBand {
   double to = 0.0;
 };
 
-/// A picture under everything, laid over these ranges of x and y.
+/// Background picture that covers these ranges of x and y.
 struct SvgBackground {
   std::string data_uri;
   AxisRange x, y;

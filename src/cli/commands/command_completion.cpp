@@ -207,7 +207,7 @@ void add_man(CLI::App& app, Session& session) {
 void add_complete(CLI::App& app, Session& session) {
   const auto request = std::make_shared<CompleteRequest>();
   CLI::App* command = app.add_subcommand("complete", "Used by the scripts of `plumbline completion`");
-  command->group("");  // not for people
+  command->group("");  // called by shells, not shown in --help
   command->add_option("--line", request->line);
   command->add_option("--word", request->word);
   command->add_option("WORDS", request->words);

@@ -30,11 +30,11 @@ core::Result<void> convert(Session& session, ConvertRequest& request) {
   if (!source) return tl::unexpected<core::Error>(source.error());
 
   const core::StopToken stop = stop_on_signals();
-  const auto told = console.counting("frames");
+  const auto show_progress = console.counting("frames");
   dataset::ConvertOptions options;
   options.replace = request.replace;
   options.stop = [&stop] { return stop.stop_requested(); };
-  options.progress = [&](std::size_t frames) { told(frames, (*source)->size()); };
+  options.progress = [&](std::size_t frames) { show_progress(frames, (*source)->size()); };
 
   const auto summary = dataset::convert_recording(**source, request.output, options, console);
 

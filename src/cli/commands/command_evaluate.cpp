@@ -156,7 +156,7 @@ core::Result<void> evaluate_paths(TrajectoryRequest& request, Console& console) 
 
   const bool single = reports->size() == 1;
   for (const evaluate::NamedReport& named : *reports) {
-    if (request.json) {  // the table for people contains them
+    if (request.json) {  // the printed table contains them
       for (const std::string& warning : named.report.warnings) {
         console.warning(single ? warning : named.name + ": " + warning);
       }

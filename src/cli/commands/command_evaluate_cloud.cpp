@@ -111,7 +111,7 @@ core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
     return tl::unexpected<core::Error>(std::move(error));
   }
 
-  if (request.json) {  // the table for people contains them
+  if (request.json) {  // the printed table contains them
     for (const std::string& warning : report->warnings) session.console().warning(warning);
   }
 

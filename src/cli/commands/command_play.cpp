@@ -32,6 +32,7 @@ core::Result<void> play(Session& session, PlayRequest& request) {
   const auto pipelines = session.pipelines_folder();
   if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
   request.open.cameras_folder = *pipelines / "cameras";
+
   Console& console = session.console();
   const auto source =
       pipeline::open_input(request.input, request.open, *pipelines / "scenes", session.executor(), console);
@@ -45,6 +46,7 @@ core::Result<void> play(Session& session, PlayRequest& request) {
 
   const auto summary = dataset::play_recording(**source, **sink, request.play, console);
   console.end_progress();
+
   if (!summary) return tl::unexpected<core::Error>(summary.error());
   if (summary->unreadable > 0)
     console.warning(fmt::format("{} frames cannot be read and were left out", summary->unreadable));

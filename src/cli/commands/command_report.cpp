@@ -29,7 +29,7 @@ void add_report(CLI::App& app, Session& session) {
 
   command->add_option("OUT", request->result, "Result folder of plumbline map or fuse")->required();
   command->add_option("OTHER", request->other,
-                      "A second result, laid over the first in the map to walk through");
+                      "A second result, shown together with the first in the map to walk through");
 
   command->add_option("-o,--output", request->output, "File to write (default: OUT/report.html)")
       ->type_name("FILE.html");

@@ -17,7 +17,7 @@ std::vector<std::string> split(const std::string& text, char at) {
   return parts;
 }
 
-/// Words of the user's own begin with a capital: "NAME|FILE" is no list of choices, "on|off" is.
+/// False for placeholders, which begin with a capital: "on|off" is a list of choices, "NAME|FILE" is not.
 bool is_literal(const std::string& word) {
   return !word.empty() &&
          std::none_of(word.begin(), word.end(), [](unsigned char c) { return std::isupper(c); });

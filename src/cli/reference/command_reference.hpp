@@ -35,7 +35,7 @@ struct CommandReference {
   [[nodiscard]] const CommandReference* find(const std::string& word) const;
 };
 
-/// Of a command and all below it; hidden ones are left out.
+/// Reference of a command and all below it, without hidden ones.
 CommandReference command_reference(const CLI::App& app);
 
 }  // namespace plumbline::cli

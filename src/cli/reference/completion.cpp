@@ -15,13 +15,13 @@ bool begins_with(const std::string& text, const std::string& start) {
   return text.compare(0, start.size(), start) == 0;
 }
 
-/// Where the values of an argument come from.
+/// Sources of an argument's values.
 struct ValueKind {
   std::optional<Kind> names;
   Paths paths = Paths::kNone;
 };
 
-/// By the name of the value; what is not here is a number or free text.
+/// Source by the value's name; values that are not listed are numbers or free text.
 ValueKind value_kind(const std::string& value) {
   static const std::map<std::string, ValueKind> kinds = {
       {"PIPELINE", {Kind::kPipelines, Paths::kFiles}}, {"NAME|FILE", {Kind::kCameras, Paths::kFiles}},
@@ -39,7 +39,7 @@ ValueKind value_kind(const std::string& value) {
   return {std::nullopt, is_path ? Paths::kFiles : Paths::kNone};
 }
 
-/// A command line as far as it is typed.
+/// The part of a command line that has been typed.
 class Line {
  public:
   Line(const CommandReference& program, const std::vector<std::string>& words, const NameSource& source)
@@ -96,7 +96,7 @@ class Line {
     return nullptr;
   }
 
-  /// The argument whose turn it is.
+  /// The positional argument that comes next.
   [[nodiscard]] const ArgumentReference* positional() const {
     std::size_t place = 0;
     for (const ArgumentReference& argument : command_->arguments) {

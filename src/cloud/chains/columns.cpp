@@ -94,6 +94,7 @@ std::vector<std::size_t> nearest(const Cloud& before, const Cloud& after) {
   for (const std::size_t i : places) points->push_back(before[i]);
   std::vector<std::size_t> found(after.size(), 0);
   if (points->empty()) return found;
+
   pcl::search::KdTree<Point> tree;
   tree.setInputCloud(points);
   pcl::Indices index(1);
@@ -103,6 +104,7 @@ std::vector<std::size_t> nearest(const Cloud& before, const Cloud& after) {
     tree.nearestKSearch(after[i], 1, index, squared);
     found[i] = places[static_cast<std::size_t>(index[0])];
   }
+
   return found;
 }
 
@@ -123,6 +125,7 @@ void append_columns(CloudColumns& columns, std::size_t size, const CloudColumns&
   append(columns.confidence, size, more.confidence, added);
   append(columns.observations, size, more.observations, added);
   append(columns.robot, size, more.robot, added);
+
   for (auto& other : columns.others) other.values.resize(size + added);
   for (const auto& other : more.others) {
     auto known = std::find_if(columns.others.begin(), columns.others.end(),

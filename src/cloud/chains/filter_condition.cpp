@@ -8,8 +8,8 @@
 namespace plumbline::cloud {
 namespace {
 
-/// Indices of the points that meet both comparisons. ConditionalRemoval's own run cannot invert its choice,
-/// and only moves the rejected points of an organised cloud.
+/// True for each point that meets both comparisons. ConditionalRemoval itself cannot invert its choice, and
+/// does not remove the rejected points of an organised cloud.
 template <typename Compare>
 std::vector<bool> within(const Cloud& input, const std::string& name, double min, double max) {
   pcl::ConditionAnd<Point> both;
@@ -29,7 +29,7 @@ class ColorFilter : public Filter {
     table.number(
         "min", min_, {0.0, 360.0}, "",
         "Smallest value to keep: red, green, blue 0 to 255, hue 0 to 360, saturation and value 0 to 1");
-    table.number("max", max_, {0.0, 360.0}, "", "Largest that passes");
+    table.number("max", max_, {0.0, 360.0}, "", "Largest value to keep");
     table.boolean("inside", inside_, "Keep points within the limits (on) or outside them (off)");
   }
   std::string check() const override {
@@ -75,7 +75,7 @@ class CurvatureFilter : public Filter {
     return min_ < max_ ? "" : fmt::format("min ({}) must be less than max ({})", min_, max_);
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
-    // PCL takes NaN for equal to anything.
+    // PCL's comparison treats NaN as equal to anything.
     const CloudConstPtr known =
         select(*input, [](std::size_t, const Point& p) { return std::isfinite(p.curvature); });
     const std::vector<bool> met = within<pcl::FieldComparison<Point>>(*known, "curvature", min_, max_);

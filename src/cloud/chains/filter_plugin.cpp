@@ -35,7 +35,8 @@ core::Result<Entry> open_plugin(const std::filesystem::path& file) {
 /// "" or why the plugin does not fit this program.
 std::string check_fit(const FilterPlugin* plugin) {
   if (plugin == nullptr || plugin->magic != kFilterPluginMagic) {
-    return fmt::format("is not a Plumbline plugin: its {} says something else", kFilterPluginSymbol);
+    return fmt::format("is not a Plumbline plugin: its {} was not made by PLUMBLINE_FILTER_PLUGIN",
+                       kFilterPluginSymbol);
   }
   if (plugin->interface != kFilterInterface) {
     return fmt::format("was built for filter interface {}, this program has {}; build it again against {}",

@@ -14,6 +14,7 @@ Json filter_schema(const FilterInfo& info) {
   const auto filter = info.make();
   core::OptionTable table;
   filter->declare(table);
+
   Json properties;
   properties["type"] = {{"const", info.type}};
   properties.update(core::options_schema(table.specs()));
@@ -30,8 +31,8 @@ Json filter_definitions(const FilterRegistry& registry) {
   entry["type"] = "object";
   entry["required"] = Json::array({"type"});
   entry["properties"]["type"]["enum"] = registry.types();
-  Json definitions;
 
+  Json definitions;
   Json cases = Json::array();
   for (const FilterInfo& info : registry.filters()) {
     const std::string name = "filter." + info.type;

@@ -29,8 +29,8 @@ constexpr double kMostSteps = 1 << 30;
 constexpr std::uint32_t kMostPoints = 1U << 26;
 
 struct CompactHead {
-  std::uint32_t width = 0;   ///< of a grid; of a list the number of points
-  std::uint32_t height = 0;  ///< of a grid; 0: a list
+  std::uint32_t width = 0;   ///< width of a grid, or number of points of a list
+  std::uint32_t height = 0;  ///< height of a grid; 0: a list
   double step_m = 0.0;
 };
 
@@ -271,7 +271,7 @@ core::Result<CloudPtr> decode_cloud(const std::uint8_t* bytes, std::size_t size)
   constexpr std::size_t kBytesPerPoint = 17;
   try {
     if (size < kCompactMagic.size() || !std::equal(kCompactMagic.begin(), kCompactMagic.end() - 1, bytes)) {
-      throw core::BadBytes("these bytes are none");
+      throw core::BadBytes("its bytes are not a stored cloud");
     }
     if (bytes[kCompactMagic.size() - 1] != kCompactMagic.back()) {
       throw core::BadBytes("it was written by another version");

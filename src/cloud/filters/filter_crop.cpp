@@ -120,10 +120,9 @@ FilterInfo crop_box_filter() {
 FilterInfo pass_through_filter() {
   return {"pass_through", "Keeps points of which one field lies within limits.",
           "PCL's PassThrough. Points whose field is not a number are removed. In a camera's own frame "
-          "`field: z` is the "
-          "depth: the noise of structured light grows with its square, so distant points do a map more harm "
-          "than good. `column` selects another column of the file: `column: confidence, min: 0.5` keeps "
-          "well-seen points.",
+          "`field: z` is the depth: the noise of structured light grows with its square, so distant points "
+          "do a map more harm than good. `column` selects another column of the file: `column: confidence, "
+          "min: 0.5` keeps well-seen points.",
           "- type: pass_through\n  field: normal_y\n  min: -1\n  max: -0.9\n",
           [] { return std::make_unique<PassThroughFilter>(); }};
 }

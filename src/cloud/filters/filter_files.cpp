@@ -94,9 +94,8 @@ FilterInfo merge_filter() {
   return {"merge", "Adds the points of another file.",
           "The points of the file are appended to those of the chain, unchanged: both clouds must be in one "
           "frame (otherwise put transform before it). Columns that only one of the two has are 0 for the "
-          "other's points. "
-          "Whole inputs are merged by naming several: `plumbline filter CHAIN "
-          "IN... OUT`. The result is a list, not organised.",
+          "other's points. Whole inputs are merged by naming several: `plumbline filter CHAIN IN... OUT`. "
+          "The result is a list, not organised.",
           "- type: merge\n  file: other.ply\n", [] { return std::make_unique<MergeFilter>(); }};
 }
 

@@ -51,8 +51,8 @@ class NormalsFilter : public Filter {
 FilterInfo normals_filter() {
   return {"normals", "Estimates normals and curvature from the neighbours, turned to the viewpoint.",
           "PCL's NormalEstimation. The viewpoint is that of the run (the camera of a keyframe) or the one in "
-          "the file. "
-          "Points with fewer than three neighbours get NaN normals. The result is a list, not organised.",
+          "the file. Points with fewer than three neighbours get NaN normals. The result is a list, not "
+          "organised.",
           "- type: normals\n  neighbours: 0\n  radius: 3 cm\n",
           [] { return std::make_unique<NormalsFilter>(); }};
 }

@@ -270,9 +270,8 @@ class ClustersFilter : public Filter {
 FilterInfo plane_filter() {
   return {"plane", "Finds the largest planes and keeps, removes or colours their points.",
           "PCL's SACSegmentation, one plane after the other among the remaining points; `refine: spread` is "
-          "the rule of "
-          "PCL's program pcl_sac_segmentation_plane. The same cloud gives the same planes. Only the points "
-          "themselves count: a plane includes everything near it, also furniture that it cuts.",
+          "the rule of PCL's program pcl_sac_segmentation_plane. The same cloud gives the same planes. Only "
+          "the points themselves count: a plane includes everything near it, also furniture that it cuts.",
           "- type: plane\n  distance: 2 cm\n  planes: 2\n  mode: remove\n",
           [] { return std::make_unique<PlaneFilter>(); }};
 }

@@ -171,7 +171,7 @@ DepthLimits::DepthLimits(const DepthRaster& raster)
     const std::uint16_t* at = raster.nearest.data() + begin;
     for (std::size_t i = 0; i < width; ++i) {
       const std::uint16_t above = *(at + i - width), here = at[i], below = at[i + width];
-      // 0, which is none, less 1 is the largest number.
+      // 0 (no depth) minus 1 wraps around to the largest number.
       const auto before = [](std::uint16_t depth) { return static_cast<std::uint16_t>(depth - 1); };
       least[i] = std::min({before(above), before(here), before(below)});
       most[i] = std::max({above, here, below});

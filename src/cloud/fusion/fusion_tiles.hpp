@@ -14,7 +14,7 @@ namespace plumbline::cloud {
 /// Box of cells, both ends included, and the views that reach into it or its margin.
 struct FusionTile {
   Eigen::AlignedBox3i cells;
-  std::size_t occupied = 0;          ///< of its cells, the margin left out
+  std::size_t occupied = 0;          ///< number of occupied cells without the margin
   std::vector<std::uint32_t> views;  ///< ascending
 
   /// Metres, the margin left out: [min, max).

@@ -12,8 +12,9 @@ constexpr float kSmoothTangent = 1.73F;  // up to 60 degrees from face on are sm
 constexpr float kLinkTangent = 3.73F;    // up to 75 degrees the surface is assumed to continue
 constexpr float kCreaseSigmas = 4.0F;
 
-/// Adds a pair of opposite neighbours to sum and count where both lie on the surface of `reference`, cell by
-/// cell. Pairs keep the mean of a slanted plane unbiased where the window is cut by a border or a jump.
+/// Adds a pair of opposite neighbours to the sum and weight of each cell where both lie on the surface of
+/// `reference`. Pairs keep the mean of a slanted plane unbiased where the window is cut by a border or a
+/// jump.
 void accumulate(const float* before, const float* after, const float* reference, const float* gate,
                 float reach, int count, float* sum, float* weight) {
   for (int i = 0; i < count; ++i) {
@@ -25,7 +26,7 @@ void accumulate(const float* before, const float* after, const float* reference,
   }
 }
 
-/// 1/z, 0 where there is no measurement.
+/// Converts depth to 1/z; 0 where there is no measurement.
 void invert(const float* depth, int count, float min_depth, float max_depth, float* inverse) {
   for (int i = 0; i < count; ++i) {
     const float z = depth[i];
@@ -48,7 +49,7 @@ struct Pass {
   void add(const float* before, const float* after, const float* reference, float reach) {
     accumulate(before, after, reference, gate.data(), reach, cells_, sum.data(), weight.data());
   }
-  /// Without measurement the mean is 0: neighbours with one are further away than any gate.
+  /// A cell without measurement keeps the mean 0: its measured neighbours differ by more than any gate.
   void finish(float* mean) const {
     for (int i = 0; i < cells_; ++i) {
       mean[i] = sum[static_cast<std::size_t>(i)] / weight[static_cast<std::size_t>(i)];
@@ -108,6 +109,7 @@ Grid smooth_inverse_depth(const cv::Mat& depth, int stride, int window, float mi
   Grid smoothed{rows.width, (depth.rows + stride - 1) / stride, {}};
   smoothed.values.resize(static_cast<std::size_t>(smoothed.width) *
                          static_cast<std::size_t>(smoothed.height));
+
   Pass pass(rows.width);
   for (int j = 0; j < smoothed.height; ++j) {
     const int v = j * stride;
@@ -118,6 +120,7 @@ Grid smooth_inverse_depth(const cv::Mat& depth, int stride, int window, float mi
     }
     pass.finish(smoothed.row(j));
   }
+
   return smoothed;
 }
 

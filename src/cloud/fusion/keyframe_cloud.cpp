@@ -104,8 +104,8 @@ class PointMaker {
   }
 
  private:
-  /// The inverse depth that gives the points' positions: means over what a plane explains, the wider the
-  /// noisier the depth. No point moves further than the noise that the image shows.
+  /// Inverse depth of the points' positions: means over neighbours on one plane, over more of them the
+  /// noisier the depth. No point moves further than the noise measured in the image.
   [[nodiscard]] Grid positions(const KeyframeCloudOptions& options) const {
     constexpr float kWanted_m = 0.0015F;
     Grid means = grid_;
@@ -159,7 +159,7 @@ class PointMaker {
   float base_;
   int longest_;
   float fx_, fy_, cx_, cy_;
-  float noise_;  ///< of the smoothed inverse depth over the raw one, neighbours being correlated
+  float noise_;  ///< noise of the smoothed inverse depth relative to the raw one; neighbours are correlated
   Grid grid_;
   Reach reach_;
   Grid position_;  ///< empty: raw depth

@@ -25,7 +25,7 @@ Point blank_point(bool color) {
   return p;
 }
 
-/// Axis 0 to 2 of a meaning; `x` is the meaning of the first axis (kX or kNormalX).
+/// Axis (0 to 2) of a meaning; `x` is the meaning of the first axis (kX or kNormalX).
 int axis_of(Meaning meaning, Meaning x) { return static_cast<int>(meaning) - static_cast<int>(x); }
 
 bool holds(const std::vector<Meaning>& meanings, std::initializer_list<Meaning> wanted) {

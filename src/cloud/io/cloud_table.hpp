@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Named columns of a file on their way into a cloud; what the readers of all formats have in common.
+// Conversion of a file's named columns into a cloud, shared by the readers of all formats.
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -10,7 +11,7 @@
 
 namespace plumbline::cloud {
 
-/// Meaning of a column of a file for a point.
+/// Property of a point that a column of a file holds.
 enum class Meaning {
   kNone,
   kX,
@@ -27,14 +28,14 @@ enum class Meaning {
   kConfidence,
   kObservations,
   kRobot,
-  kOther  ///< a number that is carried along
+  kOther  ///< a number that is kept under its name
 };
 
-/// By the names in use: x y z, nx/normal_x, r/red/diffuse_red, rgb/rgba (packed), ...; case is ignored.
-/// kNone: not kept, because alpha, padding or a name that could not be written again.
+/// Meaning of a column by its name: x y z, nx/normal_x, r/red/diffuse_red, rgb/rgba (packed), ...; case is
+/// ignored. kNone: not kept, because it is alpha or padding, or its name could not be written again.
 Meaning meaning_of(const std::string& name);
 
-/// Takes values point by point.
+/// Makes a cloud from values given point by point.
 class CloudBuilder {
  public:
   /// Meanings and names of the file's columns; prepares those that the cloud gets.
@@ -51,11 +52,11 @@ class CloudBuilder {
   [[nodiscard]] CloudFile finish();
 
  private:
-  CloudFile file_;
   void take_shift();
 
-  std::array<std::vector<double>, 3> wide_;  ///< of axes whose digits are kept
-  std::vector<float*> others_;               ///< of each column of the file that is kOther, else null
+  CloudFile file_;
+  std::array<std::vector<double>, 3> wide_;  ///< values of the axes whose digits are kept
+  std::vector<float*> others_;               ///< values of each column of the file that is kOther, else null
   bool position_ = false;
 };
 

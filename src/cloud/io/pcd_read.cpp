@@ -195,7 +195,7 @@ class PcdWords {
     pieces_.pop_front();
     return true;
   }
-  /// "1,5": commas that separate no points.
+  /// True for "1,5": commas are decimal, not separators.
   [[nodiscard]] bool decimal_comma() const { return decimal_comma_; }
 
  private:

@@ -23,7 +23,7 @@ class Body {
   Body(ByteReader& reader, PlyFormat format)
       : reader_(reader), ascii_(format == PlyFormat::kAscii), swap_(format == PlyFormat::kBigEndian) {}
 
-  /// False: the file ended or a word was no number (see problem()).
+  /// False if the file ended or a word was not a number (see problem()).
   bool scalar(ScalarType type, double& value) {
     if (ascii_) return text_scalar(value);
     const std::uint8_t* bytes = reader_.take(size_of(type));

@@ -14,7 +14,7 @@ namespace plumbline::cloud {
 
 struct PlyProperty {
   std::string name;
-  ScalarType type = ScalarType::kFloat32;  ///< of a list: of its items
+  ScalarType type = ScalarType::kFloat32;  ///< type of the value, or of a list's items
   bool list = false;
   ScalarType count_type = ScalarType::kUint8;
 };

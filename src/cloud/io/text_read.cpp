@@ -27,7 +27,7 @@ std::vector<std::string> split(const std::string& line, std::string_view separat
 
 /// Numbers of all points, row after row.
 struct TextTable {
-  std::vector<std::string> names;  ///< of a header line
+  std::vector<std::string> names;  ///< column names of a header line
   std::size_t columns = 0;
   std::vector<double> values;
 };

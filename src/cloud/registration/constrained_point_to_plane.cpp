@@ -16,7 +16,7 @@ using geometry::Matrix6d;
 using geometry::Vector6d;
 
 struct Match {
-  Eigen::Vector3d point;   ///< of the source
+  Eigen::Vector3d point;   ///< point of the source
   Eigen::Vector3d normal;  ///< mean of both
   double distance;         ///< off the target along it, standard deviations
   double inverse_sigma;

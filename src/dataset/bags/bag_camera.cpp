@@ -205,10 +205,8 @@ core::Result<void> add_depth_camera(const BagSurvey& survey, const ChosenTopics&
   if (!motion) {
     return core::usage_error(
         fmt::format("{}: {} (frame '{}') and {} (frame '{}') are of different cameras, and no transform in "
-                    "/tf_static says "
-                    "how these sit; take a depth image that is aligned to colour with --topic depth=, or "
-                    "name a camera file "
-                    "with color_from_depth with --camera",
+                    "/tf_static says how these sit; take a depth image that is aligned to colour with "
+                    "--topic depth=, or name a camera file with color_from_depth with --camera",
                     survey.path, topics.color.topic->topic.name, color.frame, depth_name, depth.frame));
   }
 

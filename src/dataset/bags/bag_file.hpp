@@ -25,23 +25,23 @@ constexpr std::size_t kHeadBytes = 64;
 struct BagTopic {
   std::string name;
   std::string type;      ///< "sensor_msgs/Image", without "/msg"
-  std::string encoding;  ///< of messages: "cdr", "ros1", "json", "protobuf" ...
+  std::string encoding;  ///< encoding of the messages: "cdr", "ros1", "json", "protobuf" ...
 };
 
 /// Location of a message in its file; only the file's reader can interpret the numbers.
 struct MessagePlace {
   std::uint64_t at = 0;
   std::uint64_t offset = 0;
-  std::uint32_t size = 0;  ///< bytes, as stored
-  std::uint32_t file = 0;  ///< of a bag of several files
+  std::uint32_t size = 0;  ///< stored bytes
+  std::uint32_t file = 0;  ///< number of the file, in a bag of several files
 };
 
-/// A message as a scan meets it.
+/// A message found by a scan.
 struct BagEntry {
   std::size_t topic = 0;  ///< position in topics()
   std::int64_t log_ns = 0;
   MessagePlace place;
-  const std::uint8_t* head = nullptr;  ///< its first bytes, at most kHeadBytes; gone after the visit
+  const std::uint8_t* head = nullptr;  ///< its first bytes, at most kHeadBytes; valid only during the visit
   std::size_t head_size = 0;
 };
 
@@ -54,11 +54,11 @@ class BagFile {
   /// Visits every message in the order of the file. Damaged or missing parts are left out and reported by
   /// notes(). Error (kInput): nothing can be read.
   virtual core::Result<void> scan(const Visit& visit) = 0;
-  /// The whole of one message. Error (kInput): names the file and the place in it.
+  /// A whole message. Errors (kInput) name the file and the place in it.
   [[nodiscard]] virtual core::Result<Bytes> read(const MessagePlace& place) const = 0;
-  /// All that the scan has met.
+  /// All topics that the scan found.
   [[nodiscard]] virtual const std::vector<BagTopic>& topics() const = 0;
-  /// Remarks for a reader of the map, one sentence each.
+  /// Remarks for the user, such as damaged parts; one sentence each.
   [[nodiscard]] virtual const std::vector<std::string>& notes() const = 0;
   /// The camera.yaml that `plumbline convert` puts beside the messages; "" if there is none.
   [[nodiscard]] virtual std::string camera_yaml() const { return ""; }

@@ -16,7 +16,7 @@ struct BagReaders {
                            TransformMessage, PathMessage, CloudMessage>();
   }
 
-  /// A file of any kind; recognised by content.
+  /// Opens a bag of any format, which is recognised by its content.
   OpenedBag (*open)(const std::filesystem::path& file);
   const MessageDecoder& (*cdr)();
   const MessageDecoder& (*ros1)();

@@ -21,7 +21,7 @@ struct ImageList {
   BagTopic topic;
   const MessageDecoder* decoder = nullptr;
   std::vector<ImageEntry> images;
-  std::string prefix;  ///< of names: "office.mcap:/camera/color/image_raw#"
+  std::string prefix;  ///< beginning of image names: "office.mcap:/camera/color/image_raw#"
 };
 
 class BagImages final : public MessageImages {

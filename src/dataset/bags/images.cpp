@@ -23,7 +23,7 @@ constexpr std::uint64_t kMostRvlPixels = std::uint64_t{1} << 24;
 struct RawEncoding {
   const char* name;
   int type;
-  int conversion;  ///< of cv::cvtColor, or kAsItIs
+  int conversion;  ///< code of cv::cvtColor, or kAsItIs
 };
 
 constexpr std::array<RawEncoding, 18> kEncodings = {{{"rgb8", CV_8UC3, cv::COLOR_RGB2BGR},
@@ -76,7 +76,7 @@ struct DepthHead {
   float b = 0.0F;
 };
 
-/// z = a / (value - b); 0 is no measurement.
+/// z = a / (value - b); 0 means no measurement.
 cv::Mat metres_of(const cv::Mat& values, const DepthHead& head) {
   cv::Mat metres(values.size(), CV_32FC1);
   for (int v = 0; v < values.rows; ++v) {

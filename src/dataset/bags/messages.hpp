@@ -45,7 +45,7 @@ struct CameraInfoMessage {
   std::string distortion_model;
   std::vector<double> d;
   std::array<double, 9> k{};   ///< row by row
-  std::array<double, 12> p{};  ///< of the rectified image, row by row
+  std::array<double, 12> p{};  ///< projection matrix of the rectified image, row by row
 };
 
 /// geometry_msgs/TransformStamped of a tf2_msgs/TFMessage

@@ -25,7 +25,7 @@ struct SurveyedTopic {
   std::size_t count = 0;
   std::int64_t first_ns = 0;  ///< when messages were logged
   std::int64_t last_ns = 0;
-  std::vector<ImageEntry> images;    ///< of image topics: all, in the order of the bag
+  std::vector<ImageEntry> images;    ///< all messages of an image topic, in the order of the bag
   std::vector<MessagePlace> others;  ///< the first few of the small messages about cameras
 
   [[nodiscard]] bool is(const char* type) const { return topic.type == type; }

@@ -140,8 +140,7 @@ std::string none_of(const BagSurvey& survey, const char* what) {
     if (image && topic.decoder == nullptr && topic.count > 0) {
       return fmt::format(
           "{}: {} is in {}, which is not read (read: cdr, ros1); record it with ROS, or write the images to "
-          "a "
-          "folder as docs/guide/inputs.md says",
+          "a folder as docs/guide/inputs.md says",
           survey.path, topic.topic.name, topic.topic.encoding);
     }
   }

@@ -13,7 +13,7 @@ namespace plumbline::dataset {
 struct ChosenTopic {
   const SurveyedTopic* topic = nullptr;  ///< null: there is none
   std::string why;
-  std::string encoding;  ///< of an image topic: that of its first message
+  std::string encoding;  ///< encoding of an image topic's first message
 };
 
 struct ChosenTopics {

@@ -175,7 +175,7 @@ class Player {
   std::unique_ptr<CopyTarget> target_;
   SinkWriter* writer_ = nullptr;  ///< the target's
   double step_s_ = 0.0;
-  double offset_s_ = 0.0;  ///< of this round
+  double offset_s_ = 0.0;  ///< time offset of this repetition
   Clock::time_point start_;
   std::size_t frames_ = 0;
   PlaySummary summary_;

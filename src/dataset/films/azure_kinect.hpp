@@ -77,8 +77,8 @@ class AzureKinectFile {
   std::string color_mode_;
   std::string depth_mode_;
   sensor::Camera camera_;
-  std::deque<ContainerPacket> recent_;  ///< of both tracks, because images are requested out of order
-  std::int64_t at_us_ = -1;             ///< of the last packet that was read; -1: none
+  std::deque<ContainerPacket> recent_;  ///< packets of both tracks, because images are requested out of order
+  std::int64_t at_us_ = -1;             ///< stamp of the last packet that was read; -1: none
 };
 
 }  // namespace plumbline::dataset

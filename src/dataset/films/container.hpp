@@ -43,12 +43,12 @@ struct Demuxer {
     return core::layout_of<Demuxer, ContainerContents, ContainerTrack, ContainerPacket>();
   }
 
-  void* (*open)(const char* file, ContainerContents& contents);  ///< null when it is no Matroska file
+  void* (*open)(const char* file, ContainerContents& contents);  ///< null if it is not a Matroska file
   void (*close)(void* container);
-  /// The next packet of any track; false at the end, and where the file is damaged. `with_bytes` false:
-  /// tracks and stamps alone.
+  /// The next packet of any track; false at the end, and where the file is damaged. Without
+  /// `with_bytes`, tracks and stamps alone.
   bool (*next)(void* container, ContainerPacket& packet, bool with_bytes);
-  /// To a packet of the track that is no later.
+  /// Seeks to a packet of the track at or before that stamp.
   bool (*seek)(void* container, int track, std::int64_t stamp_us);
 };
 

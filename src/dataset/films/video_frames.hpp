@@ -23,7 +23,7 @@ struct VideoDecoder {
 
   void* (*open)(const char* file);  ///< null when it cannot be decoded
   void (*close)(void* video);
-  std::int64_t (*count)(void* video);  ///< of frames, as the file says
+  std::int64_t (*count)(void* video);  ///< number of frames, as the file says
   bool (*seek)(void* video, std::int64_t frame);
   bool (*skip)(void* video);
   bool (*next)(void* video, cv::Mat& image);  ///< CV_8UC3, BGR

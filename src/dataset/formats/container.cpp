@@ -58,7 +58,7 @@ ContainerContents contents_of(const AVFormatContext& context) {
 }
 
 void* open_container(const char* file, ContainerContents& contents) {
-  av_log_set_level(AV_LOG_QUIET);  // callers, which know the file, report what is wrong with it
+  av_log_set_level(AV_LOG_QUIET);  // callers report errors with the file's name
   AVFormatContext* context = nullptr;
   const AVInputFormat* matroska = av_find_input_format("matroska");
   if (matroska == nullptr || avformat_open_input(&context, file, matroska, nullptr) < 0) return nullptr;
@@ -70,10 +70,12 @@ bool next_packet(void* container, ContainerPacket& packet, bool with_bytes) {
   const std::unique_ptr<AVPacket, void (*)(AVPacket*)> read(av_packet_alloc(),
                                                             [](AVPacket* p) { av_packet_free(&p); });
   if (read == nullptr || av_read_frame(context_of(container), read.get()) < 0) return false;
+
   packet.track = read->stream_index;
   const AVRational base = context_of(container)->streams[read->stream_index]->time_base;
   const std::int64_t pts = read->pts != AV_NOPTS_VALUE ? read->pts : read->dts;
   packet.stamp_us = av_rescale_q(pts == AV_NOPTS_VALUE ? 0 : pts, base, kMicroseconds);
+
   packet.bytes.clear();
   if (with_bytes) packet.bytes.assign(read->data, read->data + read->size);
   return true;

@@ -51,21 +51,24 @@ bool decode(jpeg_decompress_struct& info, ErrorManager& errors, const Bytes& fil
   jpeg_create_decompress(&info);
   jpeg_mem_src(&info, file.data(), static_cast<unsigned long>(file.size()));
   jpeg_read_header(&info, TRUE);
+
   const bool cmyk = info.jpeg_color_space == JCS_CMYK || info.jpeg_color_space == JCS_YCCK;
   info.out_color_space = cmyk ? JCS_CMYK : JCS_EXT_BGR;
   jpeg_start_decompress(&info);
   if (static_cast<std::int64_t>(info.output_width) * info.output_height > kMaxPixels) return false;
+
   image.create(static_cast<int>(info.output_height), static_cast<int>(info.output_width),
                cmyk ? CV_8UC4 : CV_8UC3);
   while (info.output_scanline < info.output_height) {
     JSAMPROW row = image.ptr(static_cast<int>(info.output_scanline));
     jpeg_read_scanlines(&info, &row, 1);
   }
+
   jpeg_finish_decompress(&info);
   return true;
 }
 
-/// Cyan, magenta, yellow, black to BGR; Adobe's programs store them inverted.
+/// Converts cyan, magenta, yellow, black to BGR; Adobe's programs store them inverted.
 cv::Mat from_cmyk(const cv::Mat& cmyk, bool inverted) {
   cv::Mat bgr(cmyk.size(), CV_8UC3);
   for (int v = 0; v < cmyk.rows; ++v) {
@@ -92,6 +95,7 @@ Decoded decode_jpeg(const Bytes& file) {
   errors.base.error_exit = leave;
   errors.base.emit_message = on_message;
   errors.base.output_message = be_quiet;
+
   cv::Mat image;
   const bool done = decode(info, errors, file, image);
   const bool adobe = info.saw_Adobe_marker != 0;

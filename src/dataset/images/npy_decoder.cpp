@@ -40,7 +40,7 @@ std::string_view after_key(std::string_view text, const std::string& key) {
   return colon == std::string_view::npos ? std::string_view() : text.substr(colon + 1);
 }
 
-/// Sizes in "(480, 640, 1)" that are not 1; empty if the text is no shape.
+/// Sizes in "(480, 640, 1)" that are not 1; empty if the text is not a shape.
 std::vector<std::int64_t> npy_shape(std::string_view text) {
   const std::size_t open = text.find('(');
   const std::size_t close = text.find(')', open == std::string_view::npos ? 0 : open);

@@ -194,8 +194,7 @@ Decoded decode_png(const Bytes& file) {
   }
   if (!header.common()) return decode_other(file);
 
-  // deflate cannot shrink data more than 1032 times: a small file that claims more is no reason to allocate
-  // it
+  // deflate shrinks data at most 1032 times: nothing is allocated for a small file that claims more
   const std::size_t size = (header.row_bytes() + 1) * static_cast<std::size_t>(header.height);
   if (size / 1032 > compressed.size()) return tl::unexpected<std::string>("the image data is too short");
 

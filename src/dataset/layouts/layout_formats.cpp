@@ -117,8 +117,7 @@ std::string not_a_recording_file(const fs::path& file) {
   if (file.extension() == ".r3d") {
     return fmt::format(
         "{}: is a recording of Record3D, whose depth is packed with LZFSE, which is not read; export it on "
-        "the "
-        "phone as 'EXR + JPG sequence' and give that folder",
+        "the phone as 'EXR + JPG sequence' and give that folder",
         file.string());
   }
   if (zip) return fmt::format("{}: is an archive; unpack it and give the recording's folder", file.string());

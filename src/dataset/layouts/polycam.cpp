@@ -103,8 +103,7 @@ core::Result<Layout> read_polycam(const fs::path& folder, const LayoutOptions& /
   if (layout.pairs.empty()) {
     return core::input_error(
         fmt::format("{}: no number is in images/ ({} images), depth/ ({}) and {}/ at once, with a camera "
-                    "that can be read "
-                    "({} cannot)",
+                    "that can be read ({} cannot)",
                     keyframes.string(), color.size(), depth.size(), cameras.filename().string(), left_out));
   }
 

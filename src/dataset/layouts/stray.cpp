@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Stray Scanner (a phone with LiDAR): rgb.mp4, depth/000000.png of 256 x 192 in millimetres,
-// confidence/000000.png (0 is no measurement), odometry.csv with stamps and the phone's own poses,
+// confidence/000000.png (0 means no measurement), odometry.csv with stamps and the phone's own poses,
 // camera_matrix.csv for the video.
 #include <fmt/format.h>
 

@@ -59,7 +59,7 @@ void LiveRecord::add_info(const std::string& topic, std::optional<CameraInfoMess
 
 void LiveRecord::add(const StampPairs::Pair& pair) {
   if (!begun_) begin(pair.color.stamp_ns);
-  // Logged at the stamps that the images were taken by: where they have none, that is when they came.
+  // Messages are logged at the stamps of their images, or at the time of arrival if these have none.
   bag_->write_bytes(topics_.color.name, ros2_type(topics_.color.type), pair.color.stamp_ns,
                     *pair.color.bytes);
   add_info(topics_.info, infos_.color, pair.color.stamp_ns);

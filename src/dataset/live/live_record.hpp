@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The MCAP file of what was taken from a live camera: the messages of its frames as they came.
+// MCAP file with the messages of a live camera's frames, as they arrived.
 #include <filesystem>
 #include <memory>
 #include <optional>

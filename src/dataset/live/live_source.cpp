@@ -21,7 +21,7 @@ constexpr const char* kScheme = "ros2://";
 struct LiveCamera {
   std::string name;
   std::string doubt;
-  Layout layout;  ///< of the first frames; its images are the stream
+  Layout layout;  ///< layout of the first frames; its images come from the stream
   std::shared_ptr<LiveStream> stream;
 };
 
@@ -81,7 +81,7 @@ class LiveSource final : public FrameSource {
  private:
   std::shared_ptr<LiveCamera> live_;
   sensor::Camera camera_;
-  sensor::Pinhole rectified_;  ///< of the images that are given
+  sensor::Pinhole rectified_;  ///< pinhole of the rectified images
   sensor::Rectifier rectifier_;
   std::vector<double> delays_;  ///< added to the stamps of depth
 };
@@ -149,7 +149,7 @@ std::shared_ptr<LiveStream> make_stream(const std::string& address, std::unique_
   return std::make_shared<LiveStream>(std::move(stream), topic(topics.color), topic(topics.depth), how, log);
 }
 
-/// Images that came while the camera was looked for make the first frames. Error (kInput): none can be made.
+/// Makes the first frames from the images of the survey. Error (kInput): none can be made.
 core::Result<void> begin(const std::string& address, const LiveSurvey& found, const ChosenTopics& topics,
                          const OpenOptions& options, LiveCamera& live) {
   for (const LiveMessage& message : found.images) live.stream->add(message);
@@ -173,7 +173,7 @@ core::Result<std::unique_ptr<LiveRecord>> make_record(const LiveOptions& options
   return LiveRecord::create(options.record, topics_of(topics), infos_of(survey, topics), camera);
 }
 
-/// "ros2://0?color=..." is called "ros2_0"; what is recorded is called as the record is.
+/// Name of the source: "ros2_0" for "ros2://0?color=..."; a recorded source has its record's name.
 std::string name_of_address(const std::string& address) {
   std::string name;
   for (const char c : address.substr(0, address.find('?'))) {

@@ -55,12 +55,12 @@ class LiveStream final : public MessageImages {
   LiveStream(const LiveStream&) = delete;
   LiveStream& operator=(const LiveStream&) = delete;
 
-  /// Before start(): a message that came before.
+  /// Adds a message that was received earlier; before start().
   void add(const LiveMessage& message);
-  /// From now on a thread takes what comes; `record`, which may be null, gets all frames, also those that
-  /// have a number already. Once.
+  /// Starts the thread that receives messages; call it once. `record`, which may be null, gets all frames,
+  /// also those that have a number already.
   void start(std::unique_ptr<LiveRecord> record);
-  /// Takes what comes until there is a first frame, before start(); false: none came in time.
+  /// Receives messages until there is a first frame, before start(); false if none arrived in time.
   bool wait_for_first(std::chrono::milliseconds most);
 
   // The functions below are thread-safe.
@@ -102,7 +102,7 @@ class LiveStream final : public MessageImages {
   const std::string depth_prefix_;
   const Options options_;
   core::Log& log_;
-  StampPairs pairs_;  ///< of the thread
+  StampPairs pairs_;  ///< used by the thread only
   std::chrono::steady_clock::time_point first_taken_;
   std::chrono::steady_clock::time_point last_taken_;
   bool told_silence_ = false;
@@ -111,7 +111,7 @@ class LiveStream final : public MessageImages {
   std::unique_ptr<LiveRecord> record_;
   std::optional<std::int64_t> last_us_;  ///< stamp of the last frame
 
-  mutable std::mutex mutex_;  ///< of what follows
+  mutable std::mutex mutex_;  ///< guards the members below
   std::condition_variable changed_;
   std::vector<PairInfo> infos_;
   std::map<std::size_t, Frame> frames_;  ///< those that can be read

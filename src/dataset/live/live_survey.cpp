@@ -158,7 +158,7 @@ class StreamSurveyor {
   const BagReaders& readers_;
   std::shared_ptr<MemoryBag> bag_;
   LiveSurvey found_;
-  std::map<std::string, std::string> types_;  ///< of topics that are listened to
+  std::map<std::string, std::string> types_;  ///< types of the subscribed topics
   Clock::time_point looked_;
   Clock::time_point judged_;
   Clock::time_point first_image_;

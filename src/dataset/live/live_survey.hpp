@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Contents of a stream of messages: listened to for a moment and treated as if it were a bag.
+// Survey of a stream of messages, which is received for a moment and then treated like a bag.
 #include <memory>
 #include <string>
 #include <vector>
@@ -22,13 +22,12 @@ struct LiveMessage {
 
 struct LiveSurvey {
   BagSurvey survey;
-  std::vector<LiveMessage> images;  ///< all that came, in order: none is lost while the camera is looked for
+  std::vector<LiveMessage> images;  ///< all received so far, in order, so that none is lost during the survey
 };
 
-/// Subscribes to what could be a camera and listens until colour, depth and what is known of their cameras
-/// are there, at most `patience`; then unsubscribes from all but the chosen images. `named` as in
-/// choose_topics. Errors: those of choose_topics; kInput: no image came, with topics and types that were
-/// seen.
+/// Subscribes to all topics that could be a camera's until colour, depth and their calibration have arrived,
+/// for at most `patience`; then unsubscribes from all but the chosen images. `named` as in choose_topics.
+/// Errors: those of choose_topics; kInput: no image arrived (names the topics and types that were seen).
 core::Result<LiveSurvey> survey_stream(const std::string& address, MessageStream& stream,
                                        const TopicNames& named, std::chrono::milliseconds patience,
                                        const core::StopToken& stop);

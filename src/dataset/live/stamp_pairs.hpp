@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// pair_by_stamp for images that come one after another.
+// Pairing by stamp for images that arrive one after another.
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -11,9 +11,8 @@
 
 namespace plumbline::dataset {
 
-/// A pair is what is nearest to each other, and certain: no image that is still to come, later than those of
-/// its topic that are there, could be nearer to either. So pair_by_stamp finds the same pairs among the
-/// images of these pairs, whatever else came.
+/// Pairs images that are nearest to each other, once no later image of either topic could be nearer. Among
+/// the images of these pairs, pair_by_stamp therefore finds the same pairs.
 class StampPairs {
  public:
   struct Stamped {
@@ -29,15 +28,15 @@ class StampPairs {
   StampPairs(double max_gap_s, double depth_delay_s);
   void add_color(Stamped image) { add(color_, std::move(image)); }
   void add_depth(Stamped image) { add(depth_, std::move(image)); }
-  /// The next pair by time; none: it is not certain yet. `final`: nothing is to come.
+  /// The next pair by time; none if it is not certain yet. `final`: no more images will arrive.
   std::optional<Pair> next(bool final);
-  /// Images that were left alone.
+  /// Number of images without a partner.
   [[nodiscard]] std::size_t unpaired() const { return unpaired_; }
 
  private:
   using List = std::deque<Stamped>;
   void add(List& list, Stamped image);
-  /// stamp_gap_us of the two.
+  /// Gap of the two stamps in microseconds (stamp_gap_us).
   [[nodiscard]] long long gap(const Stamped& color, const Stamped& depth) const;
   [[nodiscard]] std::optional<std::size_t> nearest_depth(std::size_t color) const;
   [[nodiscard]] std::optional<std::size_t> nearest_color(std::size_t depth) const;

@@ -6,7 +6,7 @@
 namespace plumbline::dataset {
 namespace {
 
-/// Without a header: columns separated by commas and a stamp of whole nanoseconds are EuRoC's.
+/// True for a header with commas or a stamp in "ns"; without a header, for commas and whole nanoseconds.
 bool is_euroc(const TrajectoryText& text) {
   if (text.header) return text.commas || text.header->stamp_name.find("ns") != std::string::npos;
   if (!text.commas || text.rows.empty()) return false;

@@ -16,7 +16,7 @@ namespace plumbline::dataset {
 struct TrajectoryColumns {
   std::array<std::size_t, 8> at{};
   bool nanoseconds = false;  ///< EuRoC's own names (p_RS_R_x), which it writes nanoseconds with
-  std::string stamp_name;    ///< of the stamp's column, unit included
+  std::string stamp_name;    ///< name of the stamp's column, with its unit
 };
 
 struct TrajectoryText {

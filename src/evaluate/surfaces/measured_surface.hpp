@@ -17,7 +17,7 @@ namespace plumbline::evaluate {
 struct Foot {
   double distance = 0.0;
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
-  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< of the surface there, unit; zero = unknown
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< unit normal of the surface there; zero = unknown
 };
 
 class MeasuredSurface {

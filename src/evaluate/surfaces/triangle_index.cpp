@@ -72,7 +72,7 @@ MeshPoint TriangleIndex::nearest(const Eigen::Vector3d& q) const {
   struct Search {
     const TriangleIndex& index;
     const Eigen::Vector3d& q;
-    double slack;  ///< of the query's place in float
+    double slack;  ///< rounding error of the query's position as float
     MeshPoint best;
   } search{*this, q, 1e-6 * (1.0 + q.cwiseAbs().maxCoeff()), {}};
   search.best.squared_distance = std::numeric_limits<double>::infinity();

@@ -29,7 +29,7 @@ constexpr std::size_t kExtraRecordSize = 192;
 struct LasExtra {
   std::string name;
   std::string description;
-  std::uint8_t type = 9;  ///< of the specification: 1 unsigned char, 9 float
+  std::uint8_t type = 9;  ///< type in the specification: 1 unsigned char, 9 float
   [[nodiscard]] std::uint16_t size() const { return type == 1 ? 1 : 4; }
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// PLY (Turk 1994): what every program for clouds reads.
+// PLY (Turk 1994), which every program for point clouds reads.
 #include <fmt/format.h>
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
@@ -16,14 +16,16 @@ core::Result<void> write_ascii_ply(const std::filesystem::path& output, const cl
   core::OutputFile out(output);
   out.write("ply\nformat ascii 1.0\ncomment plumbline, metres\n");
   for (const std::string& comment : comments) out.write("comment " + comment + "\n");
+
   out.write(fmt::format("element vertex {}\n", file.cloud->size()));
   for (const std::string& name : text_columns(file)) {
     const bool byte = name == "red" || name == "green" || name == "blue" || name == "robot";
     const char* type = byte ? "uchar" : name == "observations" ? "int" : "float";
-    const bool position = name.size() == 1;
+    const bool position = name == "x" || name == "y" || name == "z";
     out.write(fmt::format("property {} {}\n", position && !file.shift.isZero(0.0) ? "double" : type, name));
   }
   out.write("end_header\n");
+
   put_text_rows(out, file, ' ');
   return out.commit();
 }
@@ -68,8 +70,7 @@ Format ply_format() {
       "Cloud as PLY",
       "Position, normal, colour, and the other columns of the map (`confidence`, `observations`, `robot`, "
       "`sigma`); opens in CloudCompare, MeshLab, PCL, Open3D. With `--datum` or `--epsg` positions are "
-      "doubles "
-      "in world coordinates, as the header says; the whole transform is in `FILE.georeference.json`.",
+      "doubles in world coordinates, as the header says; the whole transform is in `FILE.georeference.json`.",
       {"voxel", "ascii", "datum", "epsg", "origin"},
       &write_ply_cloud};
 }

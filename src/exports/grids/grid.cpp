@@ -26,14 +26,14 @@ std::pair<double, double> span_between(double from, double step, double low, dou
   return {std::max(0.0, t0), std::min(1.0, t1)};
 }
 
-/// Counts the rays that cross cells.
+/// Counts for each cell the rays that cross it.
 class RayCounter {
  public:
   RayCounter(const Grid& grid, double low_m, double high_m)
       : grid_(grid), low_m_(low_m), high_m_(high_m), counts_(grid.cells.size(), 0) {}
 
   void add(const ViewRays& rays) {
-    const double margin_m = 1.5 * grid_.resolution_m;  // in front of the hit: noise, and the cell itself
+    const double margin_m = 1.5 * grid_.resolution_m;  // before the hit, for noise and the cell itself
     for (const Eigen::Vector3f& end : rays.ends) {
       const Eigen::Vector3d way = end.cast<double>() - rays.origin;
       const double length_m = way.norm();
@@ -61,9 +61,9 @@ class RayCounter {
     const Eigen::Vector2d b = a + way;
     const int steps = std::abs(static_cast<int>(std::floor(b.x())) - cell.x()) +
                       std::abs(static_cast<int>(std::floor(b.y())) - cell.y());
-    Eigen::Vector2d next, between;
 
     Eigen::Vector2i towards;
+    Eigen::Vector2d next, between;  // next border and distance of borders, in shares of the segment
     for (int k = 0; k < 2; ++k) {
       towards[k] = way[k] > 0.0 ? 1 : -1;
       between[k] = way[k] == 0.0 ? 1e300 : 1.0 / std::abs(way[k]);
@@ -94,8 +94,8 @@ class RayCounter {
   std::vector<std::uint8_t> counts_;
 };
 
-/// Empty cells over all points and the cameras' path, with two of margin: a robot starts where it filmed,
-/// which may lie beyond everything that it saw.
+/// Grid of unknown cells over all points and the cameras' path with a margin of two cells: a robot starts
+/// where it recorded, which may lie beyond all points.
 core::Result<Grid> grid_over(const cloud::CloudFile& file, const std::vector<ExportPose>& path,
                              double resolution_m) {
   constexpr double kMostCells = 268435456.0;
@@ -110,9 +110,9 @@ core::Result<Grid> grid_over(const cloud::CloudFile& file, const std::vector<Exp
   const Eigen::Array2d low = (box.min().array() / resolution_m).floor() - 2.0;
   const Eigen::Array2d high = (box.max().array() / resolution_m).floor() + 3.0;
   if ((high - low).prod() > kMostCells) {
-    return core::usage_error(
-        fmt::format("--resolution: cells of {} m would be {:.0f} million; choose larger ones, or a --box",
-                    resolution_m, (high - low).prod() / 1e6));
+    return core::usage_error(fmt::format(
+        "--resolution: {:.0f} million cells of {} m are too many; choose larger cells, or a --box",
+        (high - low).prod() / 1e6, resolution_m));
   }
 
   grid.origin = low * resolution_m;
@@ -123,7 +123,7 @@ core::Result<Grid> grid_over(const cloud::CloudFile& file, const std::vector<Exp
   return grid;
 }
 
-/// Points in each cell between two heights.
+/// Number of points in each cell between two heights.
 std::vector<int> points_in_cells(const Grid& grid, const cloud::CloudFile& file, double low_m,
                                  double high_m) {
   std::vector<int> counts(grid.cells.size(), 0);
@@ -144,10 +144,11 @@ core::Result<Grid> make_grid(MapSource& source) {
   const ExportOptions& options = source.options();
   if (options.heights[0] >= options.heights[1])
     return core::usage_error("--heights: takes two heights over the floor, the lower first");
+
   const auto cloud = source.cloud();
   if (!cloud) return tl::unexpected(cloud.error());
 
-  const auto path = source.poses(false);  // none may be selected
+  const auto path = source.poses(false);  // without poses the points alone bound the grid
   auto grid = grid_over(**cloud, path ? *path : std::vector<ExportPose>{},
                         options.resolution_m > 0.0 ? options.resolution_m : kGridDefault_m);
   if (!grid) return grid;

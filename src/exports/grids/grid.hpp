@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A map from above as cells: occupied, free, not seen.
+// Occupancy grid of a map seen from above: occupied, free and unknown cells.
 #include <cstdint>
 #include <vector>
 
@@ -25,9 +25,9 @@ struct Grid {
   }
 };
 
-/// Occupied: cells with points of the cloud between --heights over the floor. Free: the others that two rays
-/// of cameras crossed at those heights. Errors: kInput (no free space known, not upright), kUsage (heights,
-/// or so fine that the grid would be larger than 2^28 cells).
+/// Occupied: cells with several points of the cloud between --heights over the floor. Free: other cells
+/// that two or more camera rays cross at those heights. Errors: kInput (no free space known, not upright),
+/// kUsage (heights, or so fine that the grid would be larger than 2^28 cells).
 core::Result<Grid> make_grid(MapSource& source);
 
 }  // namespace plumbline::exports

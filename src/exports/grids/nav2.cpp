@@ -63,12 +63,9 @@ Format grid_format() {
           "Occupancy grid for Nav2",
           "`NAME.yaml` and `NAME.pgm` for ROS' map_server, trinary. Occupied are cells with points between "
           "`--heights` over the floor, so that neither floor nor ceiling is in it; free are the others that "
-          "cameras "
-          "saw through at these heights; the rest is unknown. Both `free_thresh: 0.196` and the grey value "
-          "205 are "
-          "chosen so that unknown stays unknown: with map_server's usual 0.25 it would load as free. The "
-          "origin is "
-          "the lower left corner in the map's frame, without a turn.",
+          "cameras saw through at these heights; the rest is unknown. Both `free_thresh: 0.196` and the grey "
+          "value 205 are chosen so that unknown stays unknown: with map_server's usual 0.25 it would load as "
+          "free. The origin is the lower left corner in the map's frame, without a turn.",
           {"resolution", "heights", "voxel"},
           &write_nav2};
 }

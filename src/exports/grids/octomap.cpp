@@ -43,9 +43,8 @@ Format octomap_format() {
           "map.db",
           "OctoMap for planning",
           "Written by liboctomap. Cells with points of the cloud are occupied, those that cameras saw "
-          "through are "
-          "free, all others are not in the tree. `.bt` is the binary tree that octomap_server loads, `.ot` a "
-          "ColorOcTree with probabilities and colours.",
+          "through are free, all others are not in the tree. `.bt` is the binary tree that octomap_server "
+          "loads, `.ot` a ColorOcTree with probabilities and colours.",
           {"resolution", "voxel"},
           &write_octomap};
 }

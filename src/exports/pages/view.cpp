@@ -360,14 +360,10 @@ Format html_format() {
           "",
           "Page to walk through the map in a browser",
           "One file that opens from disk, without a network: the cloud with levels of detail, coloured by "
-          "photo, height, "
-          "normal, confidence, σ, robot or time seen; the cameras' path with the keyframes' pictures, lines, "
-          "loops, the "
-          "floor plan; measuring, cutting, saving of what is shown. Small pictures of keyframes are taken "
-          "from the "
-          "recording as long as it is there. `--points` thins the cloud by voxels. [viewer.md](viewer.md) "
-          "tells how it "
-          "is used.",
+          "photo, height, normal, confidence, σ, robot or time seen; the cameras' path with the keyframes' "
+          "pictures, lines, loops, the floor plan; measuring, cutting, saving of what is shown. Small "
+          "pictures of keyframes are taken from the recording as long as it is there. `--points` thins the "
+          "cloud by voxels. [viewer.md](viewer.md) tells how it is used.",
           {"points", "voxel", "cut"},
           &write_view};
 }

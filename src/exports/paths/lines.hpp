@@ -8,8 +8,8 @@
 
 namespace plumbline::exports {
 
-/// The map's 3D lines, wherever they lie, in the frame of everything that is exported. Errors (kInput): there
-/// are none, or they are damaged.
+/// The map's 3D lines in the frame of all exports, from the store or the result folder. Errors (kInput): no
+/// lines, or damaged ones.
 core::Result<std::vector<maps::LineSegment3>> lines_of(const MapSource& source);
 
 }  // namespace plumbline::exports

@@ -103,8 +103,7 @@ Format poses_format() {
           "map.db",
           "Poses with covariance",
           "Robot, keyframe number, stamp, position, quaternion, and the upper triangle of the 6 x 6 "
-          "covariance of "
-          "position (m) and small turns about the world's axes (rad): the order of ROS' "
+          "covariance of position (m) and small turns about the world's axes (rad): the order of ROS' "
           "`PoseWithCovariance`. Frames between keyframes have that of the keyframe before. Choose it by the "
           "name `poses.csv` or with `--format poses`; `--what keyframes` writes keyframes only.",
           {"body"},

@@ -22,6 +22,7 @@ core::Result<std::vector<std::vector<ExportPose>>> paths_of(const MapSource& sou
   if (!body_from_camera) return tl::unexpected(body_from_camera.error());
   auto poses = source.poses(source.request().content == Content::kKeyframes);
   if (!poses) return tl::unexpected(poses.error());
+
   const geometry::Rigid3 camera_from_body = body_from_camera->inverse();
   std::vector<std::vector<ExportPose>> paths;
   for (ExportPose& pose : *poses) {

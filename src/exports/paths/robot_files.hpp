@@ -14,16 +14,16 @@ namespace plumbline::exports {
 /// Function of a format that writes the robots' paths, each in order of time, into one file.
 using WritePaths = std::function<void(core::OutputFile&, const std::vector<std::vector<ExportPose>>&)>;
 
-/// The selected poses, by robot; of the body where --body is given. Errors (kUsage): no such body; those of
-/// MapSource::poses.
+/// The selected poses, by robot: poses of the body if --body is given. Errors: those of body_from_camera_of
+/// and MapSource::poses.
 core::Result<std::vector<std::vector<ExportPose>>> paths_of(const MapSource& source);
-/// body_from_camera of --body; the identity without. Errors (kUsage).
+/// The pose of --body; the identity without it. Errors (kUsage): not a pose.
 core::Result<geometry::Rigid3> body_from_camera_of(const ExportOptions& options);
 
-/// `output` as one file; without an ending as a folder with ROBOT<ending> for each robot.
+/// Writes one file, or if `output` has no extension a folder with ROBOT<ending> for each robot.
 core::Result<ExportSummary> write_robot_files(const MapSource& source, const std::filesystem::path& output,
                                               const std::string& ending, const WritePaths& write);
-/// A comment line that names the robot, where there are several.
+/// A comment line that names the robot; "" if there is only one.
 std::string robot_comment(const std::vector<ExportPose>& path);
 
 }  // namespace plumbline::exports

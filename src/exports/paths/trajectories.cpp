@@ -40,8 +40,7 @@ core::Result<ExportSummary> write_kitti(MapSource& source, const std::filesystem
   if (paths->size() > 1 && output.has_extension()) {
     return core::usage_error(
         fmt::format("{}: KITTI's rows have neither stamps nor names to tell {} robots apart; name a folder "
-                    "instead, which "
-                    "gets a file for each",
+                    "instead, which gets a file for each",
                     output.string(), paths->size()));
   }
 

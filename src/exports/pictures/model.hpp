@@ -17,7 +17,7 @@ struct ModelPoint {
   double error_px = 0.0;                             ///< mean distance from where its pictures show it
   struct Sight {
     std::size_t picture = 0;  ///< among the model's
-    int feature = 0;          ///< of the picture's keyframe
+    int feature = 0;          ///< number of the feature in the picture's keyframe
   };
   std::vector<Sight> track;
 };

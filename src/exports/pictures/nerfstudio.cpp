@@ -120,13 +120,10 @@ Format nerfstudio_format() {
       "map.db, recording",
       "nerfstudio's transforms.json",
       "A folder with `transforms.json`, `images/`, `depth/` (16 bit, millimetres; `--depth off` leaves it "
-      "out) and "
-      "`points.ply` to start from. Poses are world_from_camera in OpenGL's axes (x right, y up, z "
-      "backwards), the "
-      "world is the map's (z up), so that `applied_transform` is the identity; the principal point has half "
-      "a pixel "
-      "added as nerfstudio counts pixels. `-o FOLDER/transforms.json`, or `--format nerfstudio -o FOLDER`. "
-      "Pictures and points are chosen as for `colmap`.",
+      "out) and `points.ply` to start from. Poses are world_from_camera in OpenGL's axes (x right, y up, z "
+      "backwards), the world is the map's (z up), so that `applied_transform` is the identity; the principal "
+      "point has half a pixel added as nerfstudio counts pixels. `-o FOLDER/transforms.json`, or `--format "
+      "nerfstudio -o FOLDER`. Pictures and points are chosen as for `colmap`.",
       {"every", "sharpest", "dense_points", "depth", "voxel"},
       &write_nerfstudio};
 }

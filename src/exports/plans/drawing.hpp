@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A drawing in metres, as SVG, PDF and DXF are made of.
+// A drawing in metres, and its files: SVG, PDF and DXF.
 #include <Eigen/Core>
 #include <filesystem>
 #include <string>
@@ -14,9 +14,9 @@ namespace plumbline::exports {
 
 struct DrawingLayer {
   std::string name;
-  std::string color = "#000000";  ///< of SVG and PDF
+  std::string color = "#000000";  ///< in SVG and PDF
   int dxf_color = 7;              ///< AutoCAD colour index
-  double width_mm = 0.25;         ///< of lines on paper
+  double width_mm = 0.25;         ///< width of lines on paper
 };
 
 struct DrawnLine {
@@ -36,7 +36,7 @@ struct DrawnText {
 
 struct Drawing {
   std::string title;
-  std::vector<std::string> notes;  ///< frame and the like, for the file's own comments
+  std::vector<std::string> notes;  ///< such as the frame, for comments in the file
   std::vector<DrawingLayer> layers;
   std::vector<DrawnLine> lines;
   std::vector<DrawnText> texts;
@@ -57,7 +57,7 @@ struct DrawingSheet {
   double per_metre_mm = 20.0;  ///< 1 : 50
   int scale = 50;
   double margin_mm = 10.0;
-  Eigen::Vector2d low = Eigen::Vector2d::Zero();  ///< of the drawing, metres
+  Eigen::Vector2d low = Eigen::Vector2d::Zero();  ///< lower left corner of the drawing, metres
   double width_mm = 0.0;
   double height_mm = 0.0;
 
@@ -72,7 +72,7 @@ DrawingSheet sheet_of(const Drawing& drawing);
 
 /// Errors: kOutput.
 core::Result<void> write_svg(const std::filesystem::path& file, const Drawing& drawing);
-/// Writes DXF R2000. `move`: transform of all positions, which moves a plan into world coordinates.
+/// Writes DXF R2000. Positions become origin + turn * position, which moves a plan into world coordinates.
 core::Result<void> write_dxf(const std::filesystem::path& file, const Drawing& drawing,
                              const Eigen::Matrix2d& turn = Eigen::Matrix2d::Identity(),
                              const Eigen::Vector2d& origin = Eigen::Vector2d::Zero());

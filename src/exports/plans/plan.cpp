@@ -254,17 +254,12 @@ Format plan_format() {
           "",
           "Floor plan or section for architects",
           "Walls at `--cut` over the floor as lines, fitted to the wall planes that `plumbline evaluate "
-          "cloud` finds "
-          "and joined at corners, both sides of a wall where both were seen; furniture is left out. Doors "
-          "are where "
-          "cameras looked through a wall (without `map.db`: what lies below a lintel); closed doors are "
-          "wall. Walls over "
-          "1 m have their length, closed rooms their area; a grid of metres, a scale bar, the paths. SVG and "
-          "PDF are "
-          "in a round scale, which is written in the file; DXF (R2000) is in metres with the layers grid, "
-          "rooms, path, "
-          "walls, "
-          "doors, dimensions. `--section x,y,x,y` draws a vertical cut along that line instead.",
+          "cloud` finds and joined at corners, both sides of a wall where both were seen; furniture is left "
+          "out. Doors are where cameras looked through a wall (without `map.db`: what lies below a lintel); "
+          "closed doors are wall. Walls over 1 m have their length, closed rooms their area; a grid of "
+          "metres, a scale bar, the paths. SVG and PDF are in a round scale, which is written in the file; "
+          "DXF (R2000) is in metres with the layers grid, rooms, path, walls, doors, dimensions. `--section "
+          "x,y,x,y` draws a vertical cut along that line instead.",
           {"cut", "section", "voxel", "datum", "epsg", "origin"},
           &write_plan};
 }

@@ -70,8 +70,8 @@ void keep_sides(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, 
 }  // namespace
 
 void drop_furniture(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, bool rays_known) {
-  constexpr double kLongest_m = 3.0;  // of furniture
-  constexpr double kLeastHigh = 0.2;  // share of a side that reaches so high as to be no furniture
+  constexpr double kLongest_m = 3.0;  // longest furniture
+  constexpr double kLeastHigh = 0.2;  // share of a side that must be higher than furniture
   keep_sides(walls, rasters, [&](std::size_t i) {
     const bool high = walls[i].high >= kLeastHigh;
     if (!high && (!rays_known || is_looked_over(walls[i], rasters[i]))) return false;

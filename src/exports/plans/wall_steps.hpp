@@ -10,7 +10,7 @@
 
 namespace plumbline::exports {
 
-/// Drops tall sides that are no wall: cameras looked over them, or they stand in front of a wall. Without
+/// Drops tall sides that are not walls: cameras looked over them, or they stand in front of a wall. Without
 /// rays only what reaches high is known to be a wall.
 void drop_furniture(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, bool rays_known);
 /// Drops door leaves and parts of furniture: short sides that neither meet walls at both ends, or one at a

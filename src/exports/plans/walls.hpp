@@ -22,11 +22,11 @@ struct WallLine {
   double offset_m = 0.0;
   double s0 = 0.0;
   double s1 = 0.0;
-  double top_m = 0.0;                   ///< that was seen of it, over the floor
+  double top_m = 0.0;                   ///< height over the floor up to which it was seen
   double high = 0.0;                    ///< share of its length that was seen up to where furniture ends
   std::vector<WallOpening> openings;    ///< in order, apart
   std::array<int, 2> corner{-1, -1};    ///< the line that its first and its last end meet; -1: none
-  std::array<int, 2> corner_end{0, 0};  ///< which end of that line; 2: somewhere along it
+  std::array<int, 2> corner_end{0, 0};  ///< end of that line: 0 first, 1 last, 2 somewhere along it
 
   [[nodiscard]] Eigen::Vector2d along() const { return {-normal.y(), normal.x()}; }
   [[nodiscard]] Eigen::Vector2d at(double s) const { return offset_m * normal + s * along(); }

@@ -16,7 +16,7 @@
 namespace plumbline::exports {
 namespace {
 
-/// The UTM zone's system on WGS 84.
+/// EPSG number of the UTM zone on WGS 84.
 int utm_epsg(double latitude, double longitude) {
   const double turned = longitude - 360.0 * std::floor((longitude + 180.0) / 360.0);
   const int zone = std::min(60, static_cast<int>(std::floor((turned + 180.0) / 6.0)) + 1);
@@ -39,7 +39,7 @@ core::Result<void> place_by_origin(const ExportOptions& options, const ProjFunct
                                    Georeference& reference) {
   const std::vector<double>& origin = options.origin;
   if (options.epsg == 0 || (origin.size() != 3 && origin.size() != 4)) {
-    return core::usage_error("--epsg N and --origin EAST,NORTH,HEIGHT[,DEGREES] go together");
+    return core::usage_error("--epsg N and --origin EAST,NORTH,HEIGHT[,DEGREES] go together; give both");
   }
   reference.epsg = options.epsg;
   reference.origin = {origin[0], origin[1], origin[2]};
@@ -60,6 +60,7 @@ core::Result<std::optional<Georeference>> georeference_of(const ExportOptions& o
   if (options.datum.empty() && !by_origin) return std::nullopt;
   if (!options.datum.empty() && by_origin)
     return core::usage_error("--datum and --epsg both say where the map lies; give one of them");
+
   const auto& proj = core::part<ProjFunctions>();
   if (!proj) return tl::unexpected(proj.error());
   Georeference reference;
@@ -72,12 +73,14 @@ core::Result<std::optional<Georeference>> georeference_of(const ExportOptions& o
 cloud::CloudFile to_world(const cloud::CloudFile& file, const Georeference& reference) {
   cloud::CloudFile result = file;
   result.cloud = std::make_shared<cloud::Cloud>(*file.cloud);
+
   const Eigen::Vector3d origin = reference * file.shift;
   result.shift = origin.array().round();
   const Eigen::Vector3d rest = origin - result.shift;
   const Eigen::Matrix3d linear = reference.linear();
   const Eigen::Matrix3f turn =
       Eigen::AngleAxisd(reference.turn, Eigen::Vector3d::UnitZ()).toRotationMatrix().cast<float>();
+
   for (cloud::Point& p : *result.cloud) {
     p.getVector3fMap() = (linear * p.getVector3fMap().cast<double>() + rest).cast<float>();
     p.getNormalVector3fMap() = (turn * p.getNormalVector3fMap()).eval();
@@ -93,9 +96,11 @@ core::Result<void> write_georeference(const std::filesystem::path& file, const G
   json["origin"] = {reference.origin.x(), reference.origin.y(), reference.origin.z()};
   json["turn_degrees"] = reference.turn * 180.0 / M_PI;
   json["scale"] = reference.scale;
+
   const Eigen::Matrix3d linear = reference.linear();
   for (int row = 0; row < 3; ++row)
     json["linear"].push_back({linear(row, 0), linear(row, 1), linear(row, 2)});
+
   json["wkt"] = reference.wkt;
   std::filesystem::path beside = file;
   beside += ".georeference.json";

@@ -16,14 +16,14 @@ struct CloudFile;
 
 namespace plumbline::exports {
 
-/// From the map's frame into a projected coordinate system: east = x, north = y, up = z; metres.
+/// Transform from the map's frame into a projected coordinate system: east = x, north = y, up = z; metres.
 struct Georeference {
   int epsg = 0;
-  std::string name;  ///< of the system
+  std::string name;  ///< name of the coordinate system
   std::string wkt;   ///< OGC well-known text, version 1, as required by LAS
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
-  double turn = 0.0;   ///< of the map's x axis from east, radians, counter-clockwise
-  double scale = 1.0;  ///< of the projection at the origin; heights stay
+  double turn = 0.0;   ///< angle from east to the map's x axis, radians, counter-clockwise
+  double scale = 1.0;  ///< scale of the projection at the origin; heights are not scaled
 
   [[nodiscard]] Eigen::Matrix3d linear() const;
   Eigen::Vector3d operator*(const Eigen::Vector3d& map) const { return origin + linear() * map; }
@@ -43,7 +43,7 @@ struct ProjFunctions {
 /// Georeference requested by --datum, or by --epsg with --origin; none if neither was given. Errors (kUsage).
 core::Result<std::optional<Georeference>> georeference_of(const ExportOptions& options);
 
-/// The cloud in world coordinates; its large part is its shift.
+/// The cloud in world coordinates, whose large part becomes the cloud's shift.
 cloud::CloudFile to_world(const cloud::CloudFile& file, const Georeference& reference);
 /// Writes FILE.georeference.json: the transform that was applied.
 core::Result<void> write_georeference(const std::filesystem::path& file, const Georeference& reference);

@@ -25,8 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// True if the input is a single cloud file.
-/// By its ending, whether it is there or not: who names a cloud is told of a cloud.
+/// True if the input is named like a cloud file. It need not exist, so that errors speak of a cloud.
 bool is_cloud_file(const fs::path& input) {
   constexpr std::array<const char*, 7> kEndings = {".ply", ".pcd", ".xyz", ".txt", ".csv", ".asc", ".pts"};
   std::error_code ec;

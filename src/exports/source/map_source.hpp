@@ -18,7 +18,7 @@ namespace plumbline::exports {
 /// A camera's pose in the frame of the results.
 struct ExportPose {
   std::int32_t robot = 0;
-  std::string robot_name;     ///< empty: of the only robot
+  std::string robot_name;     ///< empty if there is only one robot
   core::KeyframeId keyframe;  ///< invalid: a frame between keyframes, or not known
   double stamp = 0.0;         ///< seconds
   geometry::Rigid3 world_from_camera;
@@ -26,7 +26,7 @@ struct ExportPose {
 
 class MapSource {
  public:
-  /// Opens the map and settles frame and selection. Errors: kInput; kUsage for a selection that is none.
+  /// Opens the map and determines frame and selection. Errors: kInput; kUsage: the selection is not valid.
   static core::Result<MapSource> open(const ExportRequest& request, const core::Executor& executor,
                                       core::Log& log, const ExportProgress& progress);
 
@@ -41,7 +41,7 @@ class MapSource {
   [[nodiscard]] std::string name() const;
 
   /// The map's store, for data that only it holds; `what`: "free space" and the like, for the message. Errors
-  /// (kInput): there is none, with advice.
+  /// (kInput): there is no store, with advice.
   [[nodiscard]] core::Result<const maps::StoredRun*> store(const std::string& what) const;
   [[nodiscard]] bool has_store() const { return store_.has_value(); }
   [[nodiscard]] const maps::MapPlace& place() const { return place_; }
@@ -53,9 +53,9 @@ class MapSource {
   [[nodiscard]] std::string frame_text() const;
 
   /// The dense cloud in that frame, as far as it was selected, without points that are not finite. Errors
-  /// (kInput): there is none; nothing is left.
+  /// (kInput): the map has no cloud, or no point is selected.
   core::Result<const cloud::CloudFile*> cloud();
-  /// Tracked frames, by robot, then time; or of keyframes only. Errors (kInput): there are none.
+  /// Tracked frames, by robot, then time; or of keyframes only. Errors (kInput): there are no poses.
   [[nodiscard]] core::Result<std::vector<ExportPose>> poses(bool keyframes_only) const;
   /// Robots that have more than one name between them.
   [[nodiscard]] const std::vector<maps::RobotInfo>& robots() const { return robots_; }

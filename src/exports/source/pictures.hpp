@@ -18,10 +18,10 @@ namespace plumbline::exports {
 class Pictures {
  public:
   /// Opens the request's recordings, or else those the map was made from, or else the store's pictures, as
-  /// long as the source lives. Errors (kInput): there are none of these.
+  /// long as the source lives. Errors (kInput): there are no pictures.
   static core::Result<Pictures> open(const MapSource& source);
 
-  /// Number of the frame with this stamp in the robot's recording; none: it has none.
+  /// Number of the frame with this stamp in the robot's recording; none: there is no such frame.
   [[nodiscard]] std::optional<std::size_t> find(std::int32_t robot, double stamp) const;
   /// The store's pictures have colour only. Errors (kInput): cannot be read.
   [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::int32_t robot, std::size_t frame) const;
@@ -37,7 +37,7 @@ class Pictures {
     std::unique_ptr<dataset::FrameSource> corrected;  ///< null: `given` is right
     std::vector<std::pair<double, std::size_t>> stamps;
   };
-  std::map<std::int32_t, Recording> by_robot_;  ///< of stored pictures, only the stamps
+  std::map<std::int32_t, Recording> by_robot_;  ///< of stored pictures only the stamps are kept
   const maps::StoreReader* reader_ = nullptr;   ///< null: recordings are read
 };
 

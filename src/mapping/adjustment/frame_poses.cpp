@@ -51,7 +51,7 @@ std::vector<optimize::PointTerm> terms_of(const maps::SeenPoints& seen, const ma
   return terms;
 }
 
-/// A corrected pose is as uncertain as half of its correction, and never better known than the noise.
+/// A corrected pose is as uncertain as half of its correction, and never less than the noise.
 optimize::PosePrior prior_of(const Rigid3& camera_from_world, const Rigid3& correction) {
   constexpr double kLeastSigma_m = 0.001;
   constexpr double kLeastSigma_rad = 0.0005;
@@ -66,7 +66,7 @@ optimize::PosePrior prior_of(const Rigid3& camera_from_world, const Rigid3& corr
   return prior;
 }
 
-/// Belief about the pose of a frame relative to its keyframe, from the landmarks that it saw and its
+/// Prior of the pose of a frame relative to its keyframe, from the landmarks that it saw and its
 /// corrected pose.
 optimize::GraphEdge belief_of(const maps::FramePose& frame, const Rigid3& before,
                               const sensor::ImageModel& model, const maps::Map& map,
@@ -102,10 +102,10 @@ bool has_pose(const maps::FramePose& frame, const maps::Map& map) {
   return frame.tracked && map.has_keyframe(frame.reference);
 }
 
-/// Frames between keyframes, which stay where they are, tied to these by beliefs and to each other by steps.
+/// Graph of the frames between fixed keyframes: priors relative to these, and the steps from frame to frame.
 struct FrameChain {
   optimize::PoseGraph graph;
-  std::vector<int> nodes;  ///< of each frame; that of its keyframe for those that became one; -1: no pose
+  std::vector<int> nodes;  ///< node of each frame; a frame that became a keyframe has that one's; -1: no pose
 };
 
 FrameChain chain_of(const std::vector<maps::FramePose>& frames, const maps::Map& map,
@@ -127,14 +127,14 @@ FrameChain chain_of(const std::vector<maps::FramePose>& frames, const maps::Map&
   for (std::size_t i = 0; i < frames.size(); ++i) {
     int node = has_pose(frames[i], map) ? keyframes.at(frames[i].reference) : -1;
 
-    // Its belief.
+    // Its prior relative to the keyframe.
     if (maps::is_between_keyframes(frames[i], map)) {
       const int keyframe = std::exchange(node, static_cast<int>(chain.graph.poses.size()));
       chain.graph.poses.push_back({beliefs[i].b_from_a * map.camera_from_world(frames[i].reference), false});
       tie(beliefs[i], keyframe, node);
     }
 
-    // Its step.
+    // Its step from the previous frame.
     if (node >= 0 && previous >= 0 && node != previous && frames[i].camera_from_previous)
       tie(step_of(frames[i]), previous, node);
     chain.nodes.push_back(node);

@@ -52,11 +52,11 @@ class EdgeCollector {
   std::map<std::pair<KeyframeId, KeyframeId>, PoseEdge> edges_;
 };
 
-/// Errors of one keyframe after another along the way from `a` to `b`, were they independent: covariance of
-/// b_from_a. `steps` counts them.
+/// Covariance of b_from_a if the errors from one keyframe to the next, from `a` to `b`, were independent.
+/// `steps`: receives their number.
 Matrix6d covariance_of_path(const maps::Map& map, const std::vector<KeyframeId>& ids, KeyframeId a,
                             KeyframeId b, int& steps) {
-  // Smaller than of one edge, as several edges hold each keyframe.
+  // Smaller than that of one edge, because several edges constrain each keyframe.
   const Matrix6d step = geometry::information_of(0.5 * kSigma_m, 0.5 * kSigma_rad).inverse();
   Matrix6d sum = Matrix6d::Zero();
   steps = 0;
@@ -72,13 +72,13 @@ Matrix6d covariance_of_path(const maps::Map& map, const std::vector<KeyframeId>&
 
 /// Disagreement between an edge from elsewhere and the path that joins its two ends in the map.
 struct Discrepancy {
-  bool known = false;               ///< both ends of one robot, and the edge may be wrong
-  geometry::Vector6d error;         ///< as seen from the later keyframe
-  Matrix6d own = Matrix6d::Zero();  ///< covariance of the edge
-  Matrix6d way = Matrix6d::Zero();  ///< of the way, were its errors independent
+  bool known = false;                ///< both ends of one robot, and the edge may be wrong
+  geometry::Vector6d error;          ///< as seen from the later keyframe
+  Matrix6d own = Matrix6d::Zero();   ///< covariance of the edge
+  Matrix6d path = Matrix6d::Zero();  ///< covariance of the path if its errors were independent
   int steps = 0;
   [[nodiscard]] double chi2(double factor) const {
-    return error.dot((own + factor * way).ldlt().solve(error));
+    return error.dot((own + factor * path).ldlt().solve(error));
   }
 };
 
@@ -95,7 +95,7 @@ Discrepancy discrepancy(const maps::Map& map, const std::vector<KeyframeId>& ids
     d.own = carry * d.own * carry.transpose();
   }
   d.error = geometry::log_se3(error);
-  d.way = covariance_of_path(map, ids, std::min(e.a, e.b), std::max(e.a, e.b), d.steps);
+  d.path = covariance_of_path(map, ids, std::min(e.a, e.b), std::max(e.a, e.b), d.steps);
   return d;
 }
 

@@ -19,7 +19,7 @@ using core::KeyframeId;
 using geometry::Rigid3;
 using geometry::Vector6d;
 
-constexpr double kNearest_m = 0.1;
+constexpr double kNearest_m = 0.1;     // nearest point that is used
 constexpr std::size_t kSamples = 240;  // surface samples of a keyframe for relative poses
 constexpr std::size_t kLeastSamples = 20;
 
@@ -43,7 +43,7 @@ struct ImageChange {
   }
 };
 
-/// A place as two images have it, each in its camera's frame.
+/// The position of one place in the camera frames of two images.
 struct SharedPlace {
   Eigen::Vector3d in_a;
   Eigen::Vector3d in_b;
@@ -96,11 +96,11 @@ class MapRecalibration {
   }
 
   void run() {
-    const std::vector<PoseEdge> relative = relative_poses();  // as the map has them, corrected
+    const std::vector<PoseEdge> relative = relative_poses();  // the map's, corrected
     correct_edges();
     correct_frames();
 
-    make_keyframes_anew();
+    recalibrate_keyframes();
     move_keyframes(relative);
     move_landmarks();
   }
@@ -114,7 +114,7 @@ class MapRecalibration {
     return image;
   }
 
-  /// A frame that is no keyframe was freed of the shutter by its own motion.
+  /// For frames that are not keyframes: their own motion corrected the rolling shutter.
   [[nodiscard]] ImageChange image_of(const maps::FramePose& frame) const {
     ImageChange image = image_of(frame.stamp, nullptr);
     image.shutter_before = change_.before().camera().readout_s.value_or(0.0) * image.velocity;
@@ -128,20 +128,23 @@ class MapRecalibration {
     return samples;
   }
 
-  /// A relative pose that was measured with the old camera as the new one would have measured it: what both
-  /// images saw stays one thing, in the image and along the surface's normal.
+  /// The relative pose that the new camera would have measured: places seen in both images stay aligned, in
+  /// the image and along the surface's normal.
   [[nodiscard]] Rigid3 corrected(const Rigid3& b_from_a, const ImageChange& a, const ImageChange& b,
                                  const std::vector<maps::SurfaceSample>& seen_by_a) const {
     const sensor::Pinhole& image = change_.before().image();
     std::vector<SharedPlace> places;
+
     for (const maps::SurfaceSample& s : seen_by_a) {
       const Eigen::Vector3d p = s.point.cast<double>();
       const Eigen::Vector3d normal = s.normal.cast<double>();
       const Eigen::Vector3d q = b_from_a * p;
       if (p.z() < kNearest_m || q.z() < kNearest_m || !image.contains(image.project(q))) continue;
+
       const Eigen::Vector3d normal_in_b = b_from_a.rotation * normal;
       places.push_back({a.place(p, normal), b.place(q, normal_in_b), normal_in_b});
     }
+
     return places.size() < kLeastSamples ? b_from_a : aligned(places, image, b_from_a);
   }
 
@@ -160,6 +163,7 @@ class MapRecalibration {
       edge.b_from_a = corrected(edge.b_from_a, edge.a, edge.b);
       map_.replace_edge(number, edge);
     }
+
     std::vector<maps::LoopEdge> loops = map_.loops();
     for (maps::LoopEdge& loop : loops) loop.b_from_a = corrected(loop.b_from_a, loop.a, loop.b);
     map_.set_loops(std::move(loops));
@@ -193,7 +197,7 @@ class MapRecalibration {
     }
   }
 
-  void make_keyframes_anew() {
+  void recalibrate_keyframes() {
     for (const auto& [id, image] : images_) {
       auto keyframe = std::make_shared<maps::Keyframe>(map_.keyframe(id));
       if (keyframe->features != nullptr) {
@@ -201,11 +205,13 @@ class MapRecalibration {
         features::recalibrate(*features, change_, image.velocity, depth_rates(id, image));
         keyframe->features = std::move(features);
       }
+
       for (maps::SurfaceSample& sample : keyframe->surface)
         maps::recalibrate(change_, image.velocity, sample);
       if (keyframe->reference.valid() && map_.has_keyframe(keyframe->reference)) {
         keyframe->camera_from_reference = corrected(keyframe->camera_from_reference, keyframe->reference, id);
       }
+
       map_.replace_keyframe(std::move(keyframe));
     }
   }
@@ -214,6 +220,7 @@ class MapRecalibration {
   [[nodiscard]] std::vector<double> depth_rates(KeyframeId id, const ImageChange& image) const {
     std::vector<double> rates;
     if (change_.delay_s() == 0.0) return rates;
+
     const Rigid3& camera_from_world = before_.at(id);
     for (const core::PointId seen : map_.points_of(id)) {
       const maps::MapPoint* point = map_.find(seen);
@@ -239,10 +246,12 @@ class MapRecalibration {
       const Rigid3& before = before_.at(o.keyframe);
       const Eigen::Vector3d p = before * Eigen::Vector3d(place);
       if (p.z() < kNearest_m) continue;
+
       sum += map_.camera_from_world(o.keyframe).inverse() *
              images_.at(o.keyframe).place(p, before.rotation * normal);
       ++count;
     }
+
     if (count > 0) place = sum / count;
   }
 
@@ -252,6 +261,7 @@ class MapRecalibration {
       move_place(point.observations, point.normal, point.position);
       map_.refresh_point(id);
     }
+
     for (const core::LineId id : map_.line_ids()) {
       maps::MapLine& line = map_.line(id);
       move_place(line.observations, Eigen::Vector3d::Zero(), line.start);
@@ -262,10 +272,10 @@ class MapRecalibration {
   const sensor::Recalibration& change_;
   maps::Map& map_;
   std::vector<maps::FramePose>& frames_;
-  geometry::Trajectory path_;  ///< before
-  std::map<KeyframeId, Rigid3> before_;
+  geometry::Trajectory path_;            ///< path before the change
+  std::map<KeyframeId, Rigid3> before_;  ///< poses before the change
   std::map<KeyframeId, ImageChange> images_;
-  std::map<KeyframeId, std::vector<maps::SurfaceSample>> samples_;  ///< before
+  std::map<KeyframeId, std::vector<maps::SurfaceSample>> samples_;  ///< surfaces before the change
 };
 
 }  // namespace
@@ -282,6 +292,7 @@ GlobalAdjustmentSummary adjust_recalibrated_map(const sensor::Pinhole& camera, c
     fuse_points(map, id, neighbours, {{id.robot, camera}}, fusion);
     fuse_lines(map, id, neighbours, {{id.robot, camera}}, fusion);
   }
+
   const core::KeyframeId first = map.keyframe_ids().front();
   return adjust_map(map, {{first.robot, camera}}, loop_edges(map), adjustment);
 }

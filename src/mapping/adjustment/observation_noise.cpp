@@ -31,6 +31,7 @@ optimize::BundlePointObservation ObservationNoise::of(const features::PointFeatu
   seen.pixel = corner.pixel.cast<double>();
   seen.pixel_sigma = motion_factor * std::pow(orb_scale_factor, corner.octave) * (is_aligned ? aligned : 1.0);
   if (!depth_rows) return seen;
+
   seen.depth = static_cast<double>(corner.depth);
   seen.depth_sigma =
       corner.depth > 0.0F ? depth_factor * motion_factor * sensor::depth_sigma(seen.depth) : 1.0;
@@ -39,15 +40,18 @@ optimize::BundlePointObservation ObservationNoise::of(const features::PointFeatu
 
 optimize::BundleLineObservation ObservationNoise::of(const features::LineFeature& line,
                                                      double motion_factor) const {
-  constexpr double kLeast_m = 0.003;  // of an end's depth
+  constexpr double kLeast_m = 0.003;  // smallest standard deviation of an end's depth
+
   optimize::BundleLineObservation seen;
   seen.start = line.segment.start.cast<double>();
   seen.end = line.segment.end.cast<double>();
   seen.pixel_sigma = line_sigma_px * motion_factor;
   if (!line.line3 || !depth_rows) return seen;
+
   const auto sigma = [&](const Eigen::Vector3d& end, const features::EndpointNoise& noise) {
     return depth_factor * motion_factor * std::max(kLeast_m, features::endpoint_sigma(end, noise));
   };
+
   seen.has_depth = true;
   seen.start_camera = line.line3->start;
   seen.end_camera = line.line3->end;

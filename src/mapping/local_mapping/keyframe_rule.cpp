@@ -50,7 +50,7 @@ int points_with_depth(const features::FrameFeatures& features) {
                                         [](const features::PointFeature& f) { return f.depth > 0.0F; }));
 }
 
-/// If a scene has fewer landmarks than a rule requires, half of those that should be seen suffice.
+/// True if enough landmarks are matched: `wanted`, or half of the visible ones if a scene has fewer.
 bool enough(std::size_t matched, int wanted, std::size_t visible) {
   return 2 * matched >= std::min(2 * static_cast<std::size_t>(wanted), visible);
 }

@@ -38,12 +38,12 @@ bool fits(const maps::MapPoint& point, const features::PointFeature& f,
   const double sigma = std::pow(scale_factor, f.octave);
   if ((camera.project(p) - f.pixel.cast<double>()).squaredNorm() > kPixelGate * sigma * sigma) return false;
   if (!(f.depth > 0.0F)) return true;
-  // The landmark's own depth is no better than the measurement.
+  // The landmark's depth is no more accurate than the measurement.
   const double depth_sigma = std::sqrt(2.0) * sensor::depth_sigma(static_cast<double>(f.depth));
   return std::abs(p.z() - static_cast<double>(f.depth)) < kDepthSigmas * depth_sigma;
 }
 
-/// No keyframe sees both at different places.
+/// True if no keyframe sees both at different places.
 bool may_be_one(const maps::Map& map, const maps::MapPoint& a, const maps::MapPoint& b) {
   for (const maps::Observation& oa : a.observations) {
     for (const maps::Observation& ob : b.observations) {
@@ -55,7 +55,7 @@ bool may_be_one(const maps::Map& map, const maps::MapPoint& a, const maps::MapPo
   return true;
 }
 
-/// Both lie within the depth noise of the camera that sees them.
+/// True if both lie within the depth noise of the camera that sees them.
 bool close_together(const maps::MapPoint& a, const maps::MapPoint& b,
                     const geometry::Rigid3& camera_from_world) {
   const double z = (camera_from_world * a.position).z();
@@ -102,7 +102,7 @@ void fuse_into(maps::Map& map, const std::vector<PointId>& points, KeyframeId ke
   }
 }
 
-/// By robot; of numbers that are no robot's that of the first one.
+/// Focal lengths by robot number; numbers that no robot has get the first camera's.
 std::vector<double> focals_of(const std::map<std::int32_t, sensor::Pinhole>& cameras) {
   std::vector<double> focals(static_cast<std::size_t>(cameras.rbegin()->first) + 1,
                              cameras.begin()->second.fx);

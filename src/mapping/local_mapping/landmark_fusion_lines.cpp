@@ -30,7 +30,7 @@ double distance(const Eigen::Vector3d& p, const maps::MapLine& line) {
   return (p - geometry::nearest_point(geometry::line_through(line.start, line.end), p)).norm();
 }
 
-/// Do both measured ends lie on the landmark, in the image and in space?
+/// True if both measured ends lie on the landmark, in the image and in space.
 bool fits(const maps::MapLine& line, const features::LineFeature& f,
           const geometry::Rigid3& camera_from_world, const sensor::Pinhole& camera) {
   const geometry::PluckerLine in_camera =
@@ -61,8 +61,8 @@ bool fits_all(const maps::Map& map, const maps::MapLine& line, const maps::MapLi
   });
 }
 
-/// Same direction, and each end of the shorter lies on the longer within the noise at its depth; no keyframe
-/// sees them as two.
+/// True if they have the same direction, each end of the shorter lies on the longer within the noise at its
+/// depth, and no keyframe sees them as two.
 bool may_be_one(const maps::MapLine& a, const maps::MapLine& b, const geometry::Rigid3& camera_from_world) {
   const Eigen::Vector3d da = (a.end - a.start).normalized();
   const Eigen::Vector3d db = (b.end - b.start).normalized();
@@ -79,7 +79,7 @@ bool may_be_one(const maps::MapLine& a, const maps::MapLine& b, const geometry::
                       [&](const maps::Observation& o) { return maps::seen_by(b.observations, o.keyframe); });
 }
 
-/// `line` spans what `other` spans, too.
+/// Extends `line` so that it covers `other`, too.
 void extend(maps::MapLine& line, const maps::MapLine& other) {
   const Eigen::Vector3d direction = (line.end - line.start).normalized();
   double low = 0.0;

@@ -53,7 +53,7 @@ class PairSearch {
     roll_deg_ = std::atan2(b_from_a_.rotation(1, 0), b_from_a_.rotation(0, 0)) * 180.0 / M_PI;
   }
 
-  /// The corner of the second image that corner `i` of the first is; -1: none that is clearly best.
+  /// The corner of the second image that matches corner `i` of the first; -1: none is clearly best.
   [[nodiscard]] int partner(int i) const {
     const features::PointFeature& f = a_.features.points[static_cast<std::size_t>(i)];
     const Eigen::Vector3d line = fundamental_ * f.pixel.cast<double>().homogeneous();
@@ -82,7 +82,7 @@ class PairSearch {
       }
     }
 
-    // Strictly less: two that both look exactly alike are no clear case.
+    // Strictly less: two candidates that look exactly alike are ambiguous.
     const bool clear =
         best_distance <= options_.max_hamming && best_distance < options_.ratio * second_distance;
     return clear ? best : -1;

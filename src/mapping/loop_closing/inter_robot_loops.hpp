@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Loops by way of other robots' maps. A keyframe that shows a place which another robot has seen too gives
-// the relative pose of the two worlds there; two such keyframes, an early and a late one, are tied by way of
-// the other robot's map.
+// Loops through other robots' maps. A keyframe that shows a place which another robot has seen too gives
+// the relative pose of the two worlds there; two such keyframes, an early and a late one, are connected
+// through the other robot's map.
 #include <memory>
 #include <optional>
 #include <vector>

@@ -223,7 +223,7 @@ void compare_surfaces(const PlaceView& query, const PlaceView& match, const std:
   result.contradiction = votes.contradiction();
 }
 
-/// The pose as the surfaces say too.
+/// Refines the pose by aligning the surfaces, too.
 void align(const PlaceView& query, const PlaceView& match, const std::vector<KeyframeId>& near,
            PlaceVerification& result) {
   const maps::Keyframe& q = query.map->keyframe(query.keyframe);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Once there is an answer to how two maps lie, it says which other keyframes should see the same: those are
-// verified, too.
+// Verifies other keyframes that should see the same place if the relative pose of two maps is right.
 #include <algorithm>
 #include <set>
 #include <utility>
@@ -21,7 +20,7 @@ struct Reach {
 constexpr Reach kMust{0.7, 0.45};  // they do
 constexpr Reach kMay{1.5, 0.7};    // most do, unless something stands between them
 
-/// The keyframe of a that should see most nearly what a camera of b sees; invalid: none does.
+/// The keyframe of a whose view should be most like that of a camera of b; invalid: none is.
 KeyframeId nearest_view(const maps::Map& a, const Rigid3& a_from_b, const Rigid3& b_from_camera,
                         const Reach& reach) {
   constexpr double kMetresPerRadian = 1.0;

@@ -11,7 +11,7 @@ namespace plumbline::mapping {
 namespace {
 
 /// Extent of a map's camera positions along a direction of its world, metres.
-double way_along(const maps::Map& map, const Eigen::Vector3d& direction) {
+double extent_along(const maps::Map& map, const Eigen::Vector3d& direction) {
   double least = std::numeric_limits<double>::max();
   double most = std::numeric_limits<double>::lowest();
   for (const core::KeyframeId id : map.keyframe_ids()) {
@@ -28,9 +28,9 @@ FreeDirection free_direction(const maps::Map& a, const maps::Map& b, const geome
                              const std::vector<VerifiedPair>& agreeing) {
   std::set<core::KeyframeId> keyframes;
   for (const VerifiedPair& pair : agreeing) keyframes.insert({pair.query, pair.match});
+
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   double count = 0.0;
-
   for (const core::KeyframeId id : keyframes) {
     const Eigen::Matrix3d a_from_camera = a.has_keyframe(id)
                                               ? a.camera_from_world(id).inverse().rotation
@@ -44,11 +44,12 @@ FreeDirection free_direction(const maps::Map& a, const maps::Map& b, const geome
 
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(scatter / std::max(1.0, count));
   FreeDirection free{axes.eigenvalues()[0], axes.eigenvalues()[1], 0.0};
-  const auto way = [&](int axis) {
+
+  const auto extent = [&](int axis) {
     const Eigen::Vector3d direction = axes.eigenvectors().col(axis);
-    return std::min(way_along(a, direction), way_along(b, a_from_b.rotation.transpose() * direction));
+    return std::min(extent_along(a, direction), extent_along(b, a_from_b.rotation.transpose() * direction));
   };
-  free.reach_m = free.corridor() ? way(0) : std::hypot(way(0), way(1));
+  free.reach_m = free.corridor() ? extent(0) : std::hypot(extent(0), extent(1));
   return free;
 }
 

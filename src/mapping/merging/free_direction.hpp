@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Directions in which only images fix the relative pose of two maps: a corridor or a lone wall can slide
-// along itself, and similar things may stand there again and again.
+// Directions in which surfaces do not constrain the relative pose of two maps: along a corridor or a lone
+// wall only images do, and similar things may be repeated there.
 #include <Eigen/Core>
 #include <vector>
 
@@ -10,15 +10,15 @@
 
 namespace plumbline::mapping {
 
-/// The direction in which the surfaces of the keyframes that agree hold least.
+/// The direction that the surfaces of the agreeing keyframes constrain least.
 struct FreeDirection {
-  /// Mean squared cosine of their normals with it; 0: nothing holds, 1/3: all directions hold alike.
+  /// Mean squared cosine of their normals with it; 0: unconstrained, 1/3: constrained like all others.
   double held = 0.0;
-  double held_next = 0.0;  ///< the same of the next direction: small too in front of a lone wall
+  double held_next = 0.0;  ///< the same for the next direction: also small in front of a lone wall
   double reach_m = 0.0;    ///< extent of the cameras along it (or along the wall), the smaller of both maps
-  /// Surfaces leave it free.
+  /// True if surfaces do not constrain it.
   [[nodiscard]] bool slides() const { return held < kHeld; }
-  /// ... and hold in the two others: a corridor.
+  /// True if they constrain the two other directions: a corridor.
   [[nodiscard]] bool corridor() const { return slides() && held_next > kHeldWell; }
 
   static constexpr double kHeld = 0.01;  ///< value if one sample in a hundred faced it

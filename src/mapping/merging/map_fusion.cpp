@@ -23,7 +23,7 @@ struct Layout {
   std::vector<std::pair<KeyframeId, KeyframeId>> ties;
 };
 
-/// Ties a part to those that are laid out already, by the pair of keyframes that share most.
+/// Connects a part to those placed already, by the pair of keyframes that share most.
 std::pair<KeyframeId, KeyframeId> tie_of(const MergeEvidence& merge, const maps::Map& part) {
   const auto share = [](const VerifiedPair& pair) { return pair.evidence.points + 2 * pair.evidence.lines; };
   const auto best =
@@ -34,7 +34,7 @@ std::pair<KeyframeId, KeyframeId> tie_of(const MergeEvidence& merge, const maps:
   return {maps::root_of(part, inside), query_in_part ? best->match : best->query};
 }
 
-/// Lays out the parts along a spanning tree of merges, those with most pairs first.
+/// Places the parts along a spanning tree of merges, those with most pairs first.
 Layout lay_out(const std::vector<MapPart>& parts, const std::vector<MergeEvidence>& merges,
                std::size_t anchor) {
   std::vector<const MergeEvidence*> order;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Would another alignment do as well?
+// Ambiguity check: searches alternative alignments that fit two maps as well.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,14 +13,16 @@ namespace {
 
 using geometry::Rigid3;
 
-constexpr double kApart_m = 1.0;     // another place: more than the drift of maps within their overlap
-constexpr double kTurned_rad = 0.3;  // ... or so far turned
+constexpr double kApart_m = 1.0;     // distance of another place: more than maps drift within their overlap
+constexpr double kTurned_rad = 0.3;  // or its rotation
 constexpr int kFewLandmarks = 30;    // too few for a decision
 constexpr double kWrong = 0.2;       // share of landmarks seen through where maps do not belong together
-// Thresholds that rule out an alignment that no landmark contradicts: this many surfaces seen through ...
+// An alignment that no landmark contradicts is refuted if this share of at least so many surfaces is seen
+// through ...
 constexpr double kNoAlternative = 0.2;
 constexpr int kSurfaces = 500;
-// ... or fewer, where landmarks match at a spot or two: an edge or a strip is alike all along itself.
+// ... or this share of fewer, if landmarks match at fewer than kSpots spots: an edge or a strip
+// looks the same all along itself.
 constexpr int kSpots = 3;
 constexpr double kNoAlternativeOfFewSpots = 0.1;
 constexpr int kFewSurfaces = 100;
@@ -43,7 +45,7 @@ bool refuted(const OverlayFit& fit, const MapFusionOptions& options) {
 }
 
 /// True if landmarks match beyond chance and nothing contradicts the alignment. Few can match: repeated
-/// things were seen from near at one end of the step and from afar at the other, and then look little alike.
+/// things seen from near at one end of the step and from afar at the other look little alike.
 bool fits_as_well(const OverlayFit& fit, const OverlayFit& best, const MapFusionOptions& options) {
   constexpr double kSigmas = 2.5;
   constexpr double kLeast = 8.0;
@@ -62,7 +64,7 @@ struct Alternative {
 };
 
 std::vector<Alternative> alternatives(const PartPair& maps, const PairSets& sets, const Rigid3& a_from_b,
-                                      const MapOverlay& laid) {
+                                      const MapOverlay& overlay) {
   std::vector<Alternative> result;
   for (std::size_t i = 1; i < sets.sets.size(); ++i) {
     const std::vector<PlacePair> places = sets.places_of(i);
@@ -70,28 +72,32 @@ std::vector<Alternative> alternatives(const PartPair& maps, const PairSets& sets
     const Difference apart = between(maps.map_b(), places.front().b, a_from_b, other);
     if (apart.elsewhere()) result.push_back({other, apart, support(sets.sets[i]), {}, false});
   }
+
   std::vector<VerifiedPair> agreeing;
   for (const std::size_t i : sets.sets.front().members) agreeing.push_back(sets.pairs[i]);
   const core::KeyframeId at = sets.places_of(0).front().b;
-  for (const Rigid3& other : laid.steps(a_from_b, agreeing, kApart_m)) {
+  for (const Rigid3& other : overlay.steps(a_from_b, agreeing, kApart_m)) {
     result.push_back({other, between(maps.map_b(), at, a_from_b, other), 0, {}, false});
   }
+
   return result;
 }
 
 /// Tests the alignment against the maps. Surfaces are used if landmarks are undecided; an alignment that only
 /// landmarks support must match at several spots.
-void check_against_maps(const MapOverlay& laid, const Rigid3& a_from_b, const OverlayFit& best,
+void check_against_maps(const MapOverlay& overlay, const Rigid3& a_from_b, const OverlayFit& best,
                         const MapFusionOptions& options, Alternative& other) {
-  other.fit = laid.fit(other.a_from_b);
+  other.fit = overlay.fit(other.a_from_b);
   other.refuted = other.support > 0 ? refuted(other.fit, options) : !fits_as_well(other.fit, best, options);
   if (other.refuted) return;
-  const MapOverlay::Surfaces surfaces = laid.surfaces(other.a_from_b);
+
+  const MapOverlay::Surfaces surfaces = overlay.surfaces(other.a_from_b);
   other.refuted = surfaces.contradict(kNoAlternative, kSurfaces);
   if (other.refuted || other.support > 0 || !surfaces.contradict(kNoAlternativeOfFewSpots, kFewSurfaces))
     return;
+
   const Eigen::Vector3d step = other.a_from_b.translation - a_from_b.translation;
-  other.refuted = laid.matching_spots(other.a_from_b, step) < kSpots;
+  other.refuted = overlay.matching_spots(other.a_from_b, step) < kSpots;
 }
 
 std::string percent(double share) { return fmt::format("{:.0f} %", 100.0 * share); }
@@ -101,19 +107,19 @@ std::string percent(double share) { return fmt::format("{:.0f} %", 100.0 * share
 int support(const ConsistentSet& set) { return static_cast<int>(std::min(set.keyframes_a, set.keyframes_b)); }
 
 Ambiguity ambiguity_of(const PartPair& maps, const PairSets& sets, const Rigid3& a_from_b) {
-  const MapOverlay laid(maps.parts[maps.a], maps.parts[maps.b]);
+  const MapOverlay overlay(maps.parts[maps.a], maps.parts[maps.b]);
   Ambiguity result;
-  result.overlap = laid.fit(a_from_b);
+  result.overlap = overlay.fit(a_from_b);
 
   if (support(sets.sets.front()) < maps.options.min_pairs) {
-    const MapOverlay::Surfaces surfaces = laid.surfaces(a_from_b);
+    const MapOverlay::Surfaces surfaces = overlay.surfaces(a_from_b);
     result.surfaces_there = surfaces.there;
     result.surfaces_through = surfaces.through;
   }
 
-  std::vector<Alternative> others = alternatives(maps, sets, a_from_b, laid);
+  std::vector<Alternative> others = alternatives(maps, sets, a_from_b, overlay);
   maps.executor.parallel_for(others.size(), [&](std::size_t i) {
-    check_against_maps(laid, a_from_b, result.overlap, maps.options, others[i]);
+    check_against_maps(overlay, a_from_b, result.overlap, maps.options, others[i]);
   });
 
   for (const Alternative& other : others) {
@@ -150,7 +156,7 @@ std::string objection(const Ambiguity& ambiguity, int agreeing, const MapFusionO
   // allowed.
   if (ambiguity.alternative >= (few ? 1 : 2) && ambiguity.alternative >= options.alternative * agreeing) {
     return fmt::format(
-        "two answers exclude each other: {} keyframes say one thing, {} another; places look alike here",
+        "two alignments exclude each other: {} keyframes support one, {} the other; places look alike here",
         agreeing, ambiguity.alternative);
   }
 

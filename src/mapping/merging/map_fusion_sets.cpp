@@ -43,9 +43,10 @@ Rigid3 worlds(const maps::Map& a, const maps::Map& b, const PlacePair& pair) {
 Alignment mean_alignment(const PartPair& maps, const std::vector<PlacePair>& pairs) {
   constexpr int kRounds = 20;
   constexpr double kHuber_m = 0.03;
-  constexpr double kArm_m = 1.0;      // radians count as the motion at this distance
-  constexpr double kFloor_m = 0.002;  // pairs of one place share their errors
+  constexpr double kArm_m = 1.0;      // distance at which a rotation counts as the motion it causes
+  constexpr double kFloor_m = 0.002;  // pairs of one place have errors in common
   constexpr double kFloor_rad = 0.001;
+
   Alignment mean;
   if (pairs.empty()) return mean;
 
@@ -63,9 +64,9 @@ Alignment mean_alignment(const PartPair& maps, const std::vector<PlacePair>& pai
     double weights = 0.0;
 
     for (std::size_t i = 0; i < pairs.size(); ++i) {
-      const Rigid3 said = worlds(a, b, pairs[i]) * b_from_middle;
-      errors[i] << said.translation - estimate.translation,
-          geometry::log_so3(said.rotation * estimate.rotation.transpose());
+      const Rigid3 measured = worlds(a, b, pairs[i]) * b_from_middle;
+      errors[i] << measured.translation - estimate.translation,
+          geometry::log_so3(measured.rotation * estimate.rotation.transpose());
       Vector6d scaled = errors[i];
       scaled.tail<3>() *= kArm_m;
       const double weight = std::min(1.0, kHuber_m / std::max(1e-9, scaled.norm()));
@@ -81,8 +82,8 @@ Alignment mean_alignment(const PartPair& maps, const std::vector<PlacePair>& pai
   Matrix6d scatter = Matrix6d::Zero();
   double spread2 = 0.0;
   for (const Vector6d& error : errors) scatter += error * error.transpose();
-
   for (const Vector6d& error : errors) spread2 += error.head<3>().squaredNorm();
+
   mean.covariance = scatter / (n * std::max(1.0, n - 1.0));
   mean.covariance.diagonal().head<3>().array() += kFloor_m * kFloor_m;
   mean.covariance.diagonal().tail<3>().array() += kFloor_rad * kFloor_rad;

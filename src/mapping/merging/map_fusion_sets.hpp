@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The steps of deciding whether two maps overlap, and of finding their relative pose.
+// Steps that decide whether two maps overlap, and find their relative pose.
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -23,28 +23,28 @@ struct PartPair {
   [[nodiscard]] const maps::Map& map_b() const { return *parts[b].map; }
 };
 
-/// Accepted pairs, and sets of these that say the same, the largest first.
+/// Accepted pairs and the consistent sets of them, the largest first.
 struct PairSets {
   std::vector<VerifiedPair> pairs;
-  std::vector<PlacePair> places;  ///< of these, ends sorted by part
+  std::vector<PlacePair> places;  ///< the same pairs, with `a` in part a and `b` in part b
   std::vector<ConsistentSet> sets;
   [[nodiscard]] std::vector<PlacePair> places_of(std::size_t set) const;
 };
-/// Without the sets.
+/// The accepted pairs, without the sets.
 PairSets accepted_pairs(const PartPair& maps, const std::vector<VerifiedPair>& pairs);
 PairSets pair_sets(const PartPair& maps, const std::vector<VerifiedPair>& pairs);
 
 /// Transform from b's world to a's according to one pair.
 geometry::Rigid3 worlds(const maps::Map& a, const maps::Map& b, const PlacePair& pair);
 
-/// Robust mean of what the pairs say.
+/// Robust mean of the alignments that the pairs give.
 Alignment mean_alignment(const PartPair& maps, const std::vector<PlacePair>& pairs);
 
-/// Different keyframes on the side that has fewer: one keyframe seen from ten others counts once.
+/// Number of different keyframes on the side that has fewer: one keyframe seen from ten others counts once.
 int support(const ConsistentSet& set);
 
-/// More pairs of keyframes that should see the same if one of the first sets is right, verified; nothing that
-/// is in `known` already.
+/// Verifies more pairs of keyframes that should see the same place if one of the first sets is right, except
+/// those in `known`.
 std::vector<VerifiedPair> verify_neighbours(const PartPair& maps, const PairSets& sets,
                                             const std::vector<VerifiedPair>& known);
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Evaluates how well one map fits over another one, and whether it would fit elsewhere as well. Where things
-// repeat (doors along a corridor, identical desks) the same images allow several answers; an answer is
-// credible if the others are contradicted by what was seen. Similar landmarks a fixed step apart reveal a
+// Evaluates how well two aligned maps fit, and whether they would fit elsewhere as well. Where things repeat
+// (doors along a corridor, identical desks) the same images allow several alignments; one is credible if what
+// was seen contradicts the others. Similar landmarks a fixed step apart reveal a
 // repetition even if no keyframe stands at both of its ends: cameras see farther than they go.
 #include <cstddef>
 #include <cstdint>
@@ -17,26 +17,26 @@ class MapOverlay {
  public:
   MapOverlay(const MapPart& a, const MapPart& b);
 
-  /// The fit of b laid over a.
+  /// The fit of b aligned with a.
   [[nodiscard]] OverlayFit fit(const geometry::Rigid3& a_from_b) const;
 
-  /// Surface samples of each map, at their place in the other, of which its cameras saw anything and that
-  /// face them: where they saw a surface too, and where they saw through.
+  /// Surface samples of each map that lie in view of the other map's cameras and face them: `there` where
+  /// these saw a surface too, `through` where they saw through it.
   struct Surfaces {
     int there = 0;
     int through = 0;
-    /// True if at least `least` landmarks, and more than this share, were seen through.
+    /// True if more than this share of at least `least` samples was seen through.
     [[nodiscard]] bool contradict(double share, int least) const {
       return there + through >= least && through > share * (there + through);
     }
   };
   [[nodiscard]] Surfaces surfaces(const geometry::Rigid3& a_from_b) const;
 
-  /// At how many spots landmarks match when b is laid over a, spots side by side as seen along `step` (in a's
-  /// world): what lies behind one another in that direction counts once.
+  /// Number of spots at which landmarks match when b is aligned with a, as seen along `step` (in a's world):
+  /// spots behind one another in that direction count once.
   [[nodiscard]] int matching_spots(const geometry::Rigid3& a_from_b, const Eigen::Vector3d& step) const;
 
-  /// Other ways to overlay b over a, a step of `least_m` or more away from `a_from_b`: those supported by
+  /// Other alignments of b with a, a step of `least_m` or more away from `a_from_b`: those supported by
   /// most landmarks seen by the keyframes of `pairs`.
   [[nodiscard]] std::vector<geometry::Rigid3> steps(const geometry::Rigid3& a_from_b,
                                                     const std::vector<VerifiedPair>& pairs,
@@ -51,8 +51,8 @@ class MapOverlay {
   };
   struct Side {
     MapPart part;
-    std::vector<Landmark> landmarks;   ///< by cell
-    std::vector<std::uint64_t> cells;  ///< of these
+    std::vector<Landmark> landmarks;   ///< sorted by cell
+    std::vector<std::uint64_t> cells;  ///< cell of each landmark
   };
   static Side side(const MapPart& part);
   static Landmark landmark(const maps::Map& map, core::PointId id);

@@ -13,7 +13,7 @@ namespace {
 using geometry::Rigid3;
 
 constexpr double kBin_m = 0.2;             // of the votes; a peak covers two in each direction
-constexpr std::size_t kPeaks = 6;          // that are looked at
+constexpr std::size_t kPeaks = 6;          // number of peaks that are tested
 constexpr std::size_t kMostVoters = 3000;  // of each side
 
 /// Votes for steps, in bins.

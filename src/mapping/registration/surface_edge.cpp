@@ -18,7 +18,8 @@ using geometry::Vector6d;
 /// Weight of all grey values together: small, so that one pair of images decides in the bundle only if others
 /// agree.
 constexpr double kPhotometricWeight = 0.02;
-constexpr double kHeld = 2500.0;  // information of a standard deviation of 2 cm: less is no hold
+// Information of a standard deviation of 2 cm; with less, a direction is free.
+constexpr double kHeld = 2500.0;
 
 std::vector<tracking::WorldSurface> surface_of(const maps::Keyframe& keyframe) {
   std::vector<tracking::WorldSurface> surface;  // "world" is the keyframe's camera
@@ -43,8 +44,8 @@ Eigen::Vector3d middle_in_view(const std::vector<tracking::WorldSurface>& surfac
   return count > 0 ? Eigen::Vector3d(sum / count) : sum;
 }
 
-/// The start, known to hold_m at `middle` and to hold_m at a metre from it: xi = (rho, phi) moves the middle
-/// by rho + phi x middle.
+/// Prior at the start, with a standard deviation of hold_m at `middle` and at a metre from it: xi = (rho,
+/// phi) moves the middle by rho + phi x middle.
 optimize::PosePrior weak_prior(const Rigid3& start, const Eigen::Vector3d& middle, double hold_m) {
   Matrix6d at_middle = Matrix6d::Identity();
   at_middle.topRightCorner<3, 3>() = -geometry::skew(middle);

@@ -29,14 +29,14 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 using Limits = PageServerLimits;
-constexpr auto kReadTime = std::chrono::seconds(1);    // that a request has to come
-constexpr auto kWriteTime = std::chrono::seconds(10);  // that a piece of an answer has to be taken
+constexpr auto kReadTime = std::chrono::seconds(1);    // limit for receiving a request
+constexpr auto kWriteTime = std::chrono::seconds(10);  // limit for sending a part of an answer
 constexpr auto kBeat = std::chrono::seconds(5);        // an empty event, to find out who has gone
 
 /// Set while a socket is to be closed unread.
 thread_local bool refusing = false;
 
-/// A fixed number of threads; whoever comes when too many wait is refused on the spot.
+/// A fixed number of threads; requests are refused at once while too many wait.
 class Tasks : public httplib::TaskQueue {
  public:
   Tasks() {
@@ -162,13 +162,13 @@ struct Running {
   Events events;
   std::string page;
   std::string token;
-  std::set<std::string> hosts;  ///< by which the server may be called
+  std::set<std::string> hosts;  ///< names by which the server may be addressed
   int port = 0;
   bool everywhere = false;  ///< it listens at all addresses
   std::thread thread;
 };
 
-/// In a time that does not tell how much of it was right.
+/// Compares in a time that does not depend on how much is right.
 bool same_secret(const std::string& given, const std::string& right) {
   unsigned char differs = given.size() == right.size() ? 0 : 1;
   for (std::size_t i = 0; i < right.size(); ++i)
@@ -176,8 +176,8 @@ bool same_secret(const std::string& given, const std::string& right) {
   return differs == 0;
 }
 
-/// Whether the server goes by this name: one of its own, or, where it listens at all addresses, any that is a
-/// number (a page of somebody else's can only make a name lead here, not a number).
+/// True if a host names this server: one of its names or, if it listens at all addresses, any numeric address
+/// (a foreign page can make a name resolve to this server, but not a number).
 bool own_name(const Running& running, const std::string& host) {
   if (running.hosts.count(host) > 0) return true;
   const std::string ending = fmt::format(":{}", running.port);
@@ -206,7 +206,7 @@ int refused(const Running& running, const httplib::Request& request) {
   return right ? 0 : 401;
 }
 
-/// Sends a listener's events as they come, until it goes or the server ends.
+/// Sends a listener's next events; false if it has left or the server ends.
 bool stream_events(Events& events, Listener& listener, httplib::DataSink& sink) {
   std::string next;
   {
@@ -292,8 +292,8 @@ core::Result<void*> start(PageServerOptions& options, std::string page) {
                                                                               : -1;
   if (port <= 0) {
     return core::usage_error(
-        fmt::format("--http {}:{}: cannot be listened at; is the port in use? Choose another one",
-                    options.host, options.port));
+        fmt::format("--http {}:{}: cannot listen there; is the port in use? Choose another one", options.host,
+                    options.port));
   }
 
   options.port = running->port = port;

@@ -35,10 +35,10 @@ using Clock = std::chrono::steady_clock;
 
 constexpr double kVoxel_m = 0.03;         // of what is sent
 constexpr std::size_t kCloudsAtOnce = 8;  // keyframes' clouds in one look
-constexpr double kMoved_m = 0.02;         // from which on a keyframe's cloud is sent anew
+constexpr double kMoved_m = 0.02;         // motion of a keyframe from which its cloud is sent again
 constexpr double kTurned = 0.01;          // radians
 
-/// The keyframe's cloud thinned, where the keyframe lies.
+/// The keyframe's thinned cloud, at the keyframe's pose.
 viewer::Points placed(const cloud::Cloud& cloud, const geometry::Rigid3& world_from_camera) {
   viewer::Points points;
   const geometry::Rigid3 world_from_depth = world_from_camera * cloud::sensor_pose(cloud);

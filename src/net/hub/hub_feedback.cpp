@@ -8,8 +8,9 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Poses and landmarks change with every keyframe: of several changes within this time the last is sent.
-constexpr auto kChangesOf = 2s;
+/// Time between checks for changes: poses and landmarks change with every keyframe, and only the latest are
+/// sent.
+constexpr auto kCheckEvery = 2s;
 
 }  // namespace
 
@@ -23,6 +24,7 @@ void HubFeedback::select(Subscriber& to, const std::string& robot,
     std::int64_t& sent = to.heads[name];
     if (head < sent) sent = 0;  // the copy was emptied
     if (head == sent) continue;
+
     auto next = maps::next_transaction(other.file(), maps::StoreStream::kMap, sent);
     if (!next || !*next) continue;
 
@@ -32,7 +34,8 @@ void HubFeedback::select(Subscriber& to, const std::string& robot,
     to.index = 0;
     return;
   }
-  to.next = Clock::now() + kChangesOf;
+
+  to.next = Clock::now() + kCheckEvery;
 }
 
 void HubFeedback::step(const std::map<std::string, RobotSession>& robots, const HubMeetings& meetings,
@@ -50,6 +53,7 @@ void HubFeedback::step(const std::map<std::string, RobotSession>& robots, const 
       if (!bus.send_feedback(name, chunk)) break;
       ++to.index;
     }
+
     const bool sent = !to.transaction || to.index == to.transaction->count();
     if (sent && Clock::now() >= to.next) select(to, name, robots, meetings);
   }

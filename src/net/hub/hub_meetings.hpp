@@ -26,11 +26,11 @@ class HubMeetings {
   /// `folder`: of the result; meetings that an earlier process left there are removed.
   HubMeetings(const std::filesystem::path& folder, const core::Executor& executor, core::Log& log);
 
-  /// The copy of a robot's store has new rows of its map.
+  /// Notes that the copy of a robot's store has new rows of its map.
   void mark_changed(const std::string& robot) { changed_.insert(robot); }
-  /// A copy was emptied: starts again with all of them.
+  /// Starts again with all copies, because one was emptied.
   void restart();
-  /// Reports what a job found and submits the next one; to be called often. True: shared frames have changed.
+  /// Reports what a job found and submits the next one; to be called often. True if a shared frame changed.
   bool step(const std::map<std::string, RobotSession>& robots);
   /// Called at the end: reports all remaining meetings, and draws.
   void finish(const std::map<std::string, RobotSession>& robots);

@@ -29,7 +29,6 @@ void HubShow::step(const std::map<std::string, RobotSession>& robots, const HubM
 
   std::vector<std::string> names;
   std::vector<Task> tasks;
-
   for (const auto& [name, session] : robots) {
     const auto number = static_cast<std::int32_t>(names.size());
     names.push_back(name);
@@ -48,14 +47,18 @@ void HubShow::step(const std::map<std::string, RobotSession>& robots, const HubM
 void HubShow::show(const std::vector<std::string>& names, const std::vector<Task>& tasks) {
   observer_->begins(names);
   for (const Task& task : tasks) {
-    // Rows that belong together may not all be there yet; the next look finds them.
-    if (const auto shown = show_robot(task); !shown) log_.debug(task.name + ": " + shown.error().message);
+    // Related rows may not all have arrived yet; a later step shows them.
+    if (const auto shown = show_robot(task); !shown) {
+      log_.debug(task.name + ": " + shown.error().message);
+      shown_heads_.erase(task.name);
+    }
   }
 }
 
 core::Result<void> HubShow::show_robot(const Task& task) {
   const auto stored = task.copy.map();
   if (!stored) return tl::unexpected(stored.error());
+
   const geometry::Trajectory path = maps::keyframe_trajectory(stored->map);
   if (path.empty()) return {};
 
@@ -71,11 +74,12 @@ core::Result<void> HubShow::show_robot(const Task& task) {
 
   for (const maps::KeyframePose& keyframe : maps::keyframe_poses(stored->map)) {
     const bool there = std::find(clouds->begin(), clouds->end(), keyframe.id) != clouds->end();
-    if (!there || !shown_clouds_[task.name].insert(keyframe.id).second) continue;
+    if (!there || shown_clouds_[task.name].count(keyframe.id) > 0) continue;
     const auto cloud = store->cloud(keyframe.id);
     if (!cloud) return tl::unexpected(cloud.error());
     observer_->added(task.number, keyframe.stamp, keyframe.world_from_camera * cloud::sensor_pose(**cloud),
                      **cloud);
+    shown_clouds_[task.name].insert(keyframe.id);
   }
 
   return {};

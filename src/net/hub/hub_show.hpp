@@ -28,7 +28,7 @@ class HubShow {
 
   /// To be called often.
   void step(const std::map<std::string, RobotSession>& robots, const HubMeetings& meetings);
-  /// Waits for the job under way.
+  /// Waits for the running job.
   void finish() {
     if (job_.valid()) job_.wait();
   }
@@ -49,7 +49,7 @@ class HubShow {
   const core::Executor& executor_;
   core::Log& log_;
   Clock::time_point next_;
-  std::map<std::string, std::int64_t> shown_heads_;                 ///< last transaction, by robot
+  std::map<std::string, std::int64_t> shown_heads_;                 ///< last transaction shown, by robot
   std::map<std::string, std::set<core::KeyframeId>> shown_clouds_;  ///< of the job
   core::Executor::Job job_;  ///< last member: it ends before the others are destroyed
 };

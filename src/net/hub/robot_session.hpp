@@ -18,7 +18,7 @@ namespace plumbline::net {
 class Presence {
  public:
   void note();
-  [[nodiscard]] bool silent() const;  ///< for a few seconds
+  [[nodiscard]] bool silent() const;  ///< true if no message has come for a few seconds
   [[nodiscard]] double silent_s() const;
   [[nodiscard]] double longest_break_s() const { return longest_break_s_; }
   /// True if this differs from what was last reported; the initial state is silent.
@@ -32,8 +32,8 @@ class Presence {
 
 class RobotSession {
  public:
-  /// `known`: its name, and its state in an earlier process. `file`: of the copy. Errors (kOutput): the copy
-  /// cannot be made.
+  /// `known`: its name, and its state in an earlier process. `file`: file of the copy. Errors (kOutput): the
+  /// copy cannot be made.
   static core::Result<RobotSession> open(RobotStatus known, const std::filesystem::path& file,
                                          std::uint64_t quota_bytes);
 
@@ -42,19 +42,19 @@ class RobotSession {
   struct Reply {
     Answer answer = Answer::kAccepted;
     std::string problem;
-    Clock::time_point until;  ///< of kTrouble: when its chunks are read again
+    Clock::time_point until;  ///< time at which chunks are read again after kTrouble
   } reply;
   bool changed = true;  ///< a status must be published
   Presence presence;
 
   [[nodiscard]] const maps::StoreReplica& copy() const { return *copy_; }
-  [[nodiscard]] const std::filesystem::path& file() const { return file_; }  ///< of the copy
+  [[nodiscard]] const std::filesystem::path& file() const { return file_; }  ///< file of the copy
   /// Applies a status of this run and incarnation, or of a later one, which takes over. True: the copy held
   /// transactions that the robot has lost, so it was emptied and everything is requested again.
   core::Result<bool> apply(const RobotStatus& next);
   /// Appends a chunk to the copy. Errors: (kInput) the robot's rows, (kOutput) this machine.
   core::Result<void> receive(const Chunk& chunk);
-  /// The copy holds everything that the robot has, and the robot has finished.
+  /// True if the robot has finished and the copy holds everything it has.
   [[nodiscard]] bool has_all() const;
   [[nodiscard]] HubStatus status() const;
   [[nodiscard]] RobotTraffic traffic() const;
@@ -65,7 +65,7 @@ class RobotSession {
     std::int64_t number = 0;
     std::uint64_t checksum = 0;
     std::uint32_t chunks = 0;
-    core::Hash hash;  ///< of all bytes so far
+    core::Hash hash;  ///< hash of all bytes so far
   };
   RobotSession() = default;
   core::Result<void> begin(const Chunk& chunk);

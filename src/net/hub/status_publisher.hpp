@@ -20,7 +20,7 @@ class StatusPublisher {
   /// The hub serves from now on; before, it only looks for other hubs.
   void serve() { serving_since_ = Clock::now(); }
   void publish(HubStatus status) const;
-  /// Publishes the hub's presence when it is due. True: it was.
+  /// Publishes the hub's presence when it is due. True if it was published.
   bool publish_presence();
   /// Repeats the final statuses until `stop`, and often enough for their addressees to receive them.
   void publish_final(const std::vector<HubStatus>& statuses, const core::StopToken& stop) const;

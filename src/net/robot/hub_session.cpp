@@ -39,7 +39,7 @@ bool HubSession::accepts() const {
   return accepted && status().connected && status_.refused.empty();
 }
 
-/// Keeps to the hub that was found first as long as it is there. True: this is the selected hub.
+/// Keeps the hub that was found first as long as it is there. True: this is the selected hub.
 bool HubSession::select(const HubStatus& hub) {
   if (id_ == hub.hub) return true;
   if (!id_.empty() && Clock::now() - received_at_ < kOtherHub) {

@@ -10,14 +10,14 @@
 
 namespace plumbline::net {
 
-/// State of the link to the hub, for the program and for people.
+/// State of the link to the hub, for the program and its user.
 struct LinkStatus {
   bool found = false;       ///< a hub has answered at least once
   bool connected = false;   ///< it was received from in the last seconds
   bool done = false;        ///< it has confirmed that it holds everything
   std::string refused;      ///< why it will never accept this run; empty: it was not refused
   std::string problem;      ///< why it cannot store rows at present
-  std::string location;     ///< pose in the shared frame, for people; empty: this robot has met no other
+  std::string location;     ///< pose in the shared frame as text; empty: this robot has met no other
   std::int64_t behind = 0;  ///< number of transactions not acknowledged
   std::uint64_t sent_bytes = 0;
   std::uint64_t resent_bytes = 0;             ///< included in sent_bytes
@@ -37,7 +37,7 @@ class HubSession {
   void reset() { hub_ = {}; }
   [[nodiscard]] const HubStatus& hub() const { return hub_; }  ///< last answer to this incarnation
   [[nodiscard]] Clock::time_point received_at() const { return received_at_; }
-  /// The hub is connected and accepts chunks.
+  /// True if the hub is connected and accepts chunks.
   [[nodiscard]] bool accepts() const;
   /// Status without the counts of sent data.
   [[nodiscard]] LinkStatus status() const;
@@ -49,7 +49,7 @@ class HubSession {
 
   core::Log& log_;
   Clock::time_point started_ = Clock::now();
-  std::string id_;                 ///< of the hub
+  std::string id_;                 ///< id of the hub
   Clock::time_point received_at_;  ///< last status of that hub
   HubStatus hub_;
   LinkStatus status_;

@@ -41,8 +41,8 @@ void OtherRobots::apply(const HubStatus& hub) {
 void OtherRobots::receive(const Chunk& chunk) {
   // The first chunk of the first transaction starts a map.
   if (chunk.index == 0 && chunk.after == 0 && others_.size() < kMostNames) {
-    Other& anew = others_[chunk.name] = {};
-    anew.number = ++numbers_;
+    Other& added = others_[chunk.name] = {};
+    added.number = ++numbers_;
   }
 
   const auto found = others_.find(chunk.name);

@@ -19,7 +19,7 @@ using namespace std::chrono_literals;
 
 constexpr const char* kStore = "map.db";
 
-/// `feedback`: as RobotLink's.
+/// Checks the request and opens the link to the hub. `feedback`: as RobotLink's.
 core::Result<std::unique_ptr<RobotLink>> open_link(const RobotRequest& request,
                                                    std::shared_ptr<mapping::OtherMapsInbox> feedback,
                                                    core::Log& log) {
@@ -48,7 +48,7 @@ std::string line_of(const LinkStatus& s, double kbytes_per_s) {
                      s.location.empty() ? "" : ", ", s.location);
 }
 
-/// Bytes a second, over the last second or more.
+/// Data rate in kB/s, over the last second or more.
 class Rate {
  public:
   double operator()(std::uint64_t bytes) {
@@ -64,10 +64,10 @@ class Rate {
  private:
   Clock::time_point at_ = Clock::now();
   std::uint64_t bytes_ = 0;
-  double value_ = 0.0;
+  double value_ = 0.0;  ///< kB/s
 };
 
-/// Waits until the hub has everything, or the robot gives up.
+/// Waits until the hub has received everything, or the robot gives up.
 core::Result<RobotOutcome> deliver(const RobotRequest& request, const fs::path& folder, const RobotLink& link,
                                    RobotOutcome outcome, const core::StopToken& stop, bool was_stopped,
                                    const Status& status) {
@@ -95,6 +95,7 @@ core::Result<RobotOutcome> deliver(const RobotRequest& request, const fs::path& 
                                         folder.string(), command);
       return outcome;
     }
+
     if (now.found && (stopped || waited_s(std::max(now.progress, since)) > request.wait_lost_s)) {
       const std::string why = now.problem.empty() ? "" : " (" + now.problem + ")";
       return core::failure(
@@ -102,6 +103,7 @@ core::Result<RobotOutcome> deliver(const RobotRequest& request, const fs::path& 
           fmt::format("the hub has not received everything{}; the map is in {}. To send the rest: {}", why,
                       folder.string(), command));
     }
+
     std::this_thread::sleep_for(50ms);
   }
 }
@@ -153,8 +155,9 @@ core::Result<RobotOutcome> run_robot(const RobotRequest& request, const core::Ex
   std::error_code ec;
   const fs::path store = request.map.output / kStore;
   if (!fs::exists(store, ec)) {
-    return core::usage_error(
-        fmt::format("{}: this pipeline writes no map.db, so there is nothing to send", request.map.pipeline));
+    return core::usage_error(fmt::format(
+        "{}: this pipeline writes no map.db, so there is nothing to send; add a stage of type store",
+        request.map.pipeline));
   }
 
   (*link)->finish(store);

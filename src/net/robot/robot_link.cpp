@@ -59,15 +59,15 @@ core::Result<void> RobotLink::follow(const fs::path& store) {
 
   // The next incarnation: of the run in the ledger, or of this run, started with an empty store.
   const std::lock_guard<std::mutex> lock(mutex_);
-  const bool anew = following() && known->empty();
+  const bool is_new = following() && known->empty();
   RobotStatus next = robot_;
   std::map<std::string, std::string>& texts = *known;
   if (!texts["run"].empty()) next.run = texts["run"];
-  if (!anew) next.heads_at_start = parse_numbers(texts["began"]);
+  if (!is_new) next.heads_at_start = parse_numbers(texts["began"]);
   next.heads_at_start.push_back(heads ? static_cast<std::uint64_t>(heads->last()) : 0);
 
   const std::vector<std::uint64_t> incarnation = parse_numbers(texts["incarnation"]);
-  if (!anew) next.incarnation = incarnation.empty() ? 0 : incarnation.front();
+  if (!is_new) next.incarnation = incarnation.empty() ? 0 : incarnation.front();
   ++next.incarnation;
   if (next.heads_at_start.size() > kMaxIncarnations) next.heads_at_start.erase(next.heads_at_start.begin());
 

@@ -19,8 +19,8 @@
 
 namespace plumbline::net {
 
-/// post() returns at once and is thread-safe. When messages go out too slowly those that come are left out
-/// and counted, but for those that must go.
+/// post() returns at once and is thread-safe. If messages are sent too slowly, new ones are dropped and
+/// counted, except those with must_go.
 class Outgoing {
  public:
   struct Message {
@@ -31,7 +31,7 @@ class Outgoing {
   };
 
   Outgoing(std::unique_ptr<dataset::MessageSink> sink, core::Log& log);
-  /// Waits for what is under way, some seconds at most.
+  /// Waits a few seconds at most until the queued messages are sent.
   ~Outgoing();
   Outgoing(const Outgoing&) = delete;
   Outgoing& operator=(const Outgoing&) = delete;
@@ -45,9 +45,9 @@ class Outgoing {
 
   std::unique_ptr<dataset::MessageSink> sink_;
   core::Log& log_;
-  std::set<std::string> announced_;  ///< of the thread
+  std::set<std::string> announced_;  ///< topics announced; used by the thread only
   bool told_problem_ = false;
-  std::mutex mutex_;  ///< of what follows
+  std::mutex mutex_;  ///< protects the members below
   std::condition_variable changed_;
   std::deque<Message> waiting_;
   std::size_t left_out_ = 0;

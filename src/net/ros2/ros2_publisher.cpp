@@ -27,7 +27,7 @@ Rigid3 body_from_optical() {
   return {rotation, Eigen::Vector3d::Zero()};
 }
 
-/// Names of ROS hold letters, digits and '_'.
+/// Names in ROS consist of letters, digits and '_'.
 std::string ros_name(const std::string& name) {
   std::string text;
   for (const char c : name) text += std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
@@ -40,7 +40,7 @@ geometry::Trajectory moved(geometry::Trajectory path, const Rigid3& frame_from_m
   return path;
 }
 
-/// 16 bytes a point, as points_message wants them; points that are none are left out.
+/// 16 bytes per point, as points_message needs them, without invalid points.
 std::vector<std::uint8_t> packed(const cloud::Cloud& cloud, const Rigid3& frame_from_cloud) {
   constexpr std::size_t kBytes = 16;
   const Eigen::Matrix3f rotation = frame_from_cloud.rotation.cast<float>();
@@ -119,7 +119,7 @@ class Ros2Publisher final : public pipeline::RunObserver {
   [[nodiscard]] std::string frame(std::int32_t robot, const char* what) const {
     return prefix(robot).empty() ? what : prefix(robot) + "/" + what;
   }
-  /// Of what is of all robots together.
+  /// Topic of data of all robots together.
   [[nodiscard]] std::string shared_topic(const char* what) const {
     return !several(robots_.size()) ? topic(0, what) : fmt::format("/plumbline/{}", what);
   }
@@ -152,7 +152,7 @@ class Ros2Publisher final : public pipeline::RunObserver {
   const PublishedNames names_;
   const std::string name_;
   const Rigid3 body_ = body_from_optical();
-  std::vector<std::string> robots_;  ///< what stands in front of names, by number; "": nothing
+  std::vector<std::string> robots_;  ///< prefix of names, by number; "": none
   Outgoing outgoing_;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Two writers on one file.
+// Check that no two stages write the same file.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,7 +10,7 @@ namespace plumbline::pipeline {
 namespace {
 
 struct Writer {
-  std::string name;  ///< for people
+  std::string name;  ///< stage, as shown in messages
   std::string file;  ///< normalised; '*' stands for a number
 };
 
@@ -31,11 +31,14 @@ bool clash(const std::string& a, const std::string& b) {
   if (star_a == std::string::npos && star_b == std::string::npos) {
     return a == b || starts_with(a, b + "/") || starts_with(b, a + "/");
   }
+
   const std::string head_a = a.substr(0, star_a);
   const std::string head_b = b.substr(0, star_b);
-  if (star_b != std::string::npos && starts_with(head_b, a + "/"))
-    return true;  // a file where a folder must be
+
+  // One is a file where the other needs a folder.
+  if (star_b != std::string::npos && starts_with(head_b, a + "/")) return true;
   if (star_a != std::string::npos && starts_with(head_a, b + "/")) return true;
+
   const std::string tail_a = star_a == std::string::npos ? a : a.substr(star_a + 1);
   const std::string tail_b = star_b == std::string::npos ? b : b.substr(star_b + 1);
   return (starts_with(head_a, head_b) || starts_with(head_b, head_a)) &&
@@ -60,7 +63,7 @@ void check_files(const StageSpecs& specs, core::ConfigProblems& problems) {
         problems.push_back({spec.mark, spec.path,
                             fmt::format("writes {}, which {} writes as well{}", file, taken->name,
                                         taken->file == normal ? "" : fmt::format(" ({})", taken->file))});
-        break;  // one is enough: two stages of a kind share all their files
+        break;  // one message is enough: two stages of a type write all the same files
       }
 
       writers.push_back({spec.path, normal});

@@ -11,7 +11,8 @@ namespace {
 constexpr const char* kIntroduction =
     "<!-- Made by `plumbline pipelines describe`; a test compares. -->\n"
     "# Stages\n\n"
-    "What may stand under `stages:` of a [pipeline file](../guide/pipelines.md). Lengths, angles and times "
+    "The stages that `stages:` of a [pipeline file](../guide/pipelines.md) may list. Lengths, angles and "
+    "times "
     "may carry a unit\n"
     "(`5 mm`, `10 deg`, `0.5 s`); without one a number is in the unit of its default. `plumbline pipelines "
     "describe STAGE --all`\n"

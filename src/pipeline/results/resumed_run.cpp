@@ -125,7 +125,7 @@ void take_maps(std::vector<maps::StoredMap> maps, std::size_t robots, ResumedRun
   }
 }
 
-/// A store in which nothing was committed yet, or none.
+/// True if nothing was committed to the store yet, or there is none.
 bool is_blank(const fs::path& file) {
   std::error_code ec;
   if (!fs::exists(file, ec)) return true;

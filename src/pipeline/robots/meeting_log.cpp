@@ -5,6 +5,8 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
+#include <utility>
+
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/viz/snapshot.hpp"
@@ -18,7 +20,7 @@ using geometry::Rigid3;
 using mapping::MeetingEvent;
 using mapping::MeetingStep;
 
-/// Surfaces that keyframes hold and landmarks, each with its robot.
+/// The keyframes' surface samples and the landmarks, coloured by robot, and the robots' paths.
 viz::Scene scene_of(const mapping::FusedMap& preview, const std::vector<std::string>& names) {
   viz::Scene scene;
   auto cloud = std::make_shared<pcl::PointCloud<pcl::PointXYZRGBNormal>>();
@@ -99,10 +101,11 @@ core::Result<void> MeetingLog::note(const MeetingEvent& event, const std::vector
     case MeetingStep::kVerified:
       log_->debug(fmt::format("{} and {}: a common place is verified {} ({})", a, b, when, keyframe));
       return {};
-
     case MeetingStep::kLocalMapAsked:
-      log_->debug(fmt::format("{} and {}: the local maps around it are requested {}", a, b, when));
+      log_->debug(
+          fmt::format("{} and {}: the local maps around the common place are requested {}", a, b, when));
       return {};
+
     case MeetingStep::kMet:
       meetings_.push_back({static_cast<int>(meetings_.size()) + 1, a, b, time_s, event.frame, false});
       log_->info(
@@ -127,12 +130,14 @@ core::Result<void> MeetingLog::write(const MeetingEvent& event, const std::vecto
   const std::filesystem::path folder =
       output_ / "meetings" / fmt::format("{:04}_{}_{}", meeting.number, meeting.a, meeting.b);
   if (auto made = core::make_folder(folder); !made) return made;
+
   const std::vector<maps::KeyframePose> keyframes = maps::keyframe_poses(event.preview->map);
   for (const std::size_t robot : event.preview->parts) {
     auto written = dataset::write_trajectory(folder / (names[robot] + ".txt"),
                                              maps::trajectory(keyframes, static_cast<std::int32_t>(robot)));
     if (!written) return written;
   }
+
   viz::Scene scene = scene_of(*event.preview, names);
   scene.title = fmt::format("{} and {} have met {}", meeting.a, meeting.b, when);
   pictures_.emplace_back(folder / "map.png", std::move(scene));

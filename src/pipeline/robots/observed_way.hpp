@@ -20,7 +20,7 @@ class ObservedWay {
 
  private:
   core::KeyframeId component_;       ///< component that is reported
-  std::optional<std::size_t> last_;  ///< of the frame poses
+  std::optional<std::size_t> last_;  ///< index of the latest tracked frame pose
   geometry::Rigid3 odometry_from_camera_;
 };
 

@@ -33,7 +33,7 @@ class RobotCameras {
   bool before(std::size_t frame, std::size_t robot, const Slams& slams);
   /// Called after a frame was tracked: starts the estimate from the present maps, beside the tracker, once.
   void after(std::size_t frame, const Slams& slams);
-  /// Asks the finished maps, until they have nothing new to say.
+  /// Estimates from the finished maps, until nothing improves any more.
   void estimate_finished(const Slams& slams);
 
   /// Takes over a robot's camera from an interrupted run; resume() follows.
@@ -44,10 +44,10 @@ class RobotCameras {
   void doubt(std::vector<Doubt>& reasons) const;
 
  private:
-  /// The maps and cameras of an estimate that is under way.
+  /// The maps and cameras of an estimate in progress.
   struct Question {
     std::vector<CameraRefinement> cameras;  ///< by robot
-    std::vector<bool> better;               ///< by robot: the answer
+    std::vector<bool> better;               ///< by robot: true if its camera was improved
     std::size_t due = 0;                    ///< the frame at which it is waited for
     core::Executor::Job job;                ///< last: its destructor waits for it
   };
@@ -63,8 +63,8 @@ class RobotCameras {
   bool asked_;  ///< while mapping
   std::vector<RobotInfo> robots_;
   std::vector<CameraRefinement> cameras_;  ///< by robot
-  std::vector<CameraRefinement> given_;    ///< before the answer came
-  std::unique_ptr<Question> question_;     ///< under way; null: none is
+  std::vector<CameraRefinement> given_;    ///< cameras before the estimate
+  std::unique_ptr<Question> question_;     ///< estimate in progress; null: none
   std::size_t use_from_ = 0;               ///< frame from which the answer is used
   std::vector<bool> waiting_;  ///< by robot: its first frame from there on has not come; empty: no answer yet
 };

@@ -14,7 +14,7 @@ namespace plumbline::pipeline {
 struct RobotComponents {
   std::vector<RobotMap> maps;      ///< by their first keyframe
   std::size_t dropped = 0;         ///< components of too few keyframes
-  std::size_t dropped_frames = 0;  ///< that were tracked in them
+  std::size_t dropped_frames = 0;  ///< number of frames tracked in them
 };
 
 /// A map without further components comes back as it is. Components of fewer than five keyframes are dropped,
@@ -27,11 +27,11 @@ std::vector<maps::FramePose> frames_of(const std::vector<const RobotMap*>& parts
 
 /// Outcome for one component.
 struct ComponentFate {
-  std::string name;        ///< of its folder, or of the robot and the keyframe that began it
+  std::string name;        ///< name of its folder, or of the robot and the keyframe that began it
   std::size_t frames = 0;  ///< tracked in it
   std::size_t keyframes = 0;
   bool joined = false;     ///< it is part of the result
-  double joined_s = -1.0;  ///< of the recording, when that was found out while mapping; negative: at the end
+  double joined_s = -1.0;  ///< time in the recording, if it was joined while mapping; negative: at the end
   int agreeing = 0;        ///< keyframes that agree
   std::string why_not;     ///< empty: joined
 };

@@ -62,7 +62,7 @@ std::string left_out(const std::vector<RobotMap>& parts, const std::vector<std::
   return text;
 }
 
-/// Components that are connected with nothing.
+/// Components that are not connected with any other.
 std::vector<std::shared_ptr<const MapResult>> components_apart(const std::vector<RobotMap>& parts,
                                                                const std::vector<std::size_t>& used) {
   std::vector<std::shared_ptr<const MapResult>> apart;
@@ -79,7 +79,7 @@ std::vector<std::shared_ptr<const MapResult>> components_apart(const std::vector
   return apart;
 }
 
-Json laid(const mapping::OverlayFit& fit) {
+Json overlay_section(const mapping::OverlayFit& fit) {
   return {{"expected", fit.expected},
           {"matched", fit.matched},
           {"chance", rounded(fit.chance)},
@@ -119,7 +119,7 @@ Json section_of(const RobotMerge& merge) {
                 {"refused", refused},
                 {"agreeing", e.consistency.agreeing},
                 {"alternative", e.ambiguity.alternative},
-                {"overlay", laid(e.ambiguity.overlap)},
+                {"overlay", overlay_section(e.ambiguity.overlap)},
                 {"expected", e.validation.expected},
                 {"confirmed", e.validation.confirmed},
                 {"pairs", e.pairs.size()},
@@ -134,7 +134,7 @@ Json section_of(const RobotMerge& merge) {
 
   if (e.ambiguity.alternative_m > 0.0) {
     entry["alternative_m"] = rounded(e.ambiguity.alternative_m);
-    entry["alternative_overlay"] = laid(e.ambiguity.alternative_overlap);
+    entry["alternative_overlay"] = overlay_section(e.ambiguity.alternative_overlap);
   }
 
   if (e.accepted) add_alignment(e.alignment, entry);

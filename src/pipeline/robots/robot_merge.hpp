@@ -17,7 +17,7 @@ namespace plumbline::pipeline {
 struct RobotMerge {
   std::string a;
   std::string b;
-  double time_s = -1.0;  ///< of the recordings, when it happened while mapping; negative: afterwards
+  double time_s = -1.0;  ///< time in the recordings, if it happened while mapping; negative: afterwards
   /// Time at which the fifth agreeing keyframe existed on both sides, or the last one if there are fewer;
   /// negative: not known.
   double evident_s = -1.0;
@@ -26,13 +26,14 @@ struct RobotMerge {
 Json section_of(const RobotMerge& merge);
 
 struct MergedRobots {
-  std::shared_ptr<MapResult> map;  ///< with the components that stay apart
+  std::shared_ptr<MapResult> map;  ///< merged map, with the components that stay apart
   std::vector<RobotMerge> merges;
-  std::string unconnected;  ///< which maps are left out and what was tried; empty: none
-  std::size_t refused = 0;  ///< adjustments that would have torn a map
+  std::string unconnected;  ///< text on which maps are left out and what was tried; empty: none
+  std::size_t refused = 0;  ///< number of adjustments that would have torn a map
 };
 
-/// Fuses the parts that are connected with `anchor`; parts.size(): the group that has most keyframes.
+/// Fuses the parts that are connected with `anchor`; if that is parts.size(), the connected group that has
+/// most keyframes.
 MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor,
                           const mapping::MapFusionOptions& options, const core::Executor& executor,
                           core::Log& log);

@@ -66,6 +66,7 @@ void report_joins(const std::string& robot, const mapping::Slam& slam,
     const auto counted = frames.find(join.overlap.b);
     component.frames = counted == frames.end() ? 0 : counted->second;
     component.keyframes = join.keyframes;
+
     component.joined = true;
     component.joined_s = join.stamp - first_s;
     component.agreeing = join.overlap.evidence.consistency.agreeing;

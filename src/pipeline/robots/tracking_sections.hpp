@@ -11,7 +11,7 @@
 
 namespace plumbline::pipeline {
 
-/// Adds one robot's to the section `loops`.
+/// Adds one robot's loops to the section `loops`.
 void report_loops(const mapping::Slam& slam, Json& loops);
 /// Adds the components that were joined while the robot mapped. `frames`: by root, as they were tracked.
 void report_joins(const std::string& robot, const mapping::Slam& slam,
@@ -19,7 +19,7 @@ void report_joins(const std::string& robot, const mapping::Slam& slam,
 /// Use that was made of other robots' maps.
 Json feedback_section(const Slams& slams, const mapping::OtherMapsInbox& others);
 
-/// Loops that agree with one another against the path.
+/// Adds a doubt if loops that agree with one another contradict the path.
 void doubt_disputed_loops(const Json& summary, std::vector<Doubt>& reasons);
 
 }  // namespace plumbline::pipeline

@@ -12,6 +12,7 @@
 namespace plumbline::pipeline {
 namespace {
 
+/// The frames of a source that have the given indices.
 class SelectedFrames : public dataset::FrameSource {
  public:
   SelectedFrames(std::unique_ptr<dataset::FrameSource> source, std::vector<std::size_t> indices)
@@ -34,25 +35,29 @@ class SelectedFrames : public dataset::FrameSource {
   std::vector<std::size_t> indices_;
 };
 
-/// Frames of `source` from `from_s` to `to_s` seconds after its first, every n-th. kUsage when none is left.
+/// Frames of `source` from `from_s` to `to_s` seconds after the first one, every n-th of them. Error
+/// (kUsage): none is left.
 core::Result<std::unique_ptr<dataset::FrameSource>> select_frames(
     std::unique_ptr<dataset::FrameSource> source, double from_s, double to_s, int every) {
   if (every < 1)
     return core::usage_error(fmt::format("every: {} is out of range (allowed: at least 1)", every));
+
   std::vector<std::size_t> indices;
   for (std::size_t i = 0; i < source->size(); i += static_cast<std::size_t>(every)) {
     const double elapsed = source->info(i).stamp - source->info(0).stamp;
     if (elapsed >= from_s && elapsed <= to_s) indices.push_back(i);
   }
+
   if (indices.empty()) {
     return core::usage_error(fmt::format("{}: no frame lies between {:g} s and {:g} s after the first",
                                          source->name(), from_s, to_s));
   }
+
   if (indices.size() == source->size()) return source;
   return std::make_unique<SelectedFrames>(std::move(source), std::move(indices));
 }
 
-constexpr double kForever_s = 1e299;
+constexpr double kForever_s = 1e299;  // values of --for from here on mean no limit
 
 core::Result<std::unique_ptr<dataset::FrameSource>> open_live_input(const std::string& address,
                                                                     dataset::OpenOptions options,

@@ -64,7 +64,7 @@ std::string config_text(const MapRequest& request, const Graph& graph, int threa
   return text + to_yaml(graph);
 }
 
-/// Tells recordings apart without reading their images.
+/// Text that identifies a recording without reading its images.
 std::string input_text(const RobotRecordings& source) {
   if (source.live()) return "live: " + quoted(source.name()) + "\n";
   core::Hash hash;
@@ -199,7 +199,7 @@ void report_resumed(const std::filesystem::path& folder, const std::optional<Res
           : fmt::format("{}: there is nothing to continue; starting with the first frame", folder.string()));
 }
 
-/// Keeps what a failed run has stored, and says so in the error.
+/// Keeps what a failed run has stored, and adds that to the error.
 core::Error with_what_is_kept(core::Error error, maps::OutputFolder& output) {
   const std::size_t keyframes = stored_keyframes(output.path());
   if (keyframes == 0) return error;

@@ -11,19 +11,18 @@
 
 namespace plumbline::pipeline {
 
-/// Limits the rate at which frames are handed out: frame n of a recording no earlier than n / hz seconds
-/// after the first frame of all. Results do not depend on it. Several recordings are played together: their
-/// frames keep the order of their stamps, so that one with fewer frames a second keeps its own rate beside
-/// the densest, which has `hz`.
+/// Limits the rate at which frames enter the pipeline: frame n of a recording no earlier than n / hz seconds
+/// after the first frame of all. Results do not depend on it. Several recordings are played together in the
+/// order of their stamps: the one with most frames per second has `hz`, the others are slower accordingly.
 class Pace {
  public:
-  /// hz 0: at once. `first`: the first frame of the run.
+  /// hz 0: no limit. `first`: the first frame of the run.
   Pace(double hz, std::size_t first, const RobotRecordings* recordings)
       : hz_(hz), recordings_(recordings), first_s_(due_s(first)) {}
 
-  /// Waits until the frame may be handed out, or until `stop` is requested.
+  /// Waits until the frame is due, or until `stop` is requested.
   void wait_for(std::size_t frame, const core::StopToken& stop);
-  /// True if the frame may be handed out. The clock starts with the first query.
+  /// True if the frame is due. The clock starts with the first query.
   bool is_due(std::size_t frame);
   /// Reports a frame as completely processed.
   void done(std::size_t frame);

@@ -27,7 +27,7 @@ double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-/// One frame under way, with the outputs of each stage so far.
+/// One frame in progress, with the outputs of each stage so far.
 struct Tick {
   std::size_t frame = 0;
   std::vector<std::vector<Value>> outputs;  ///< [node][port]
@@ -105,8 +105,8 @@ class Runner {
     const auto start = Clock::now();
     pace_.emplace(pace_hz_, started_, context_.input.recordings);
 
-    // A pipeline ends when the next frame is not due yet, and another one begins with that: whoever waits for
-    // a frame keeps no thread from what else there is to do.
+    // A pipeline ends when the next frame is not due yet, and another one begins with that frame: waiting for
+    // a frame blocks no thread that has other work.
     while (!ended()) {
       pace_->wait_for(started_, context_.stop);
       wait_for_live();

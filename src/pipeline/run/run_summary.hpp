@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// summary.json, the lines for people and timing.csv of a finished run, from what its stages report.
+// summary.json, the printed summary and timing.csv of a finished run, from the reports of its stages.
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -15,9 +15,9 @@ namespace plumbline::pipeline {
 
 /// Circumstances of the run.
 struct RunFacts {
-  std::string input;     ///< as it was given
+  std::string input;     ///< input as it was given
   std::string pipeline;  ///< likewise
-  double pace_hz = 0.0;  ///< that recordings were played at; 0: as fast as that went
+  double pace_hz = 0.0;  ///< rate at which recordings were played; 0: as fast as possible
   double wall_s = 0.0;   ///< the whole run
   int threads = 0;
 };

@@ -23,7 +23,7 @@
 namespace plumbline::pipeline {
 namespace {
 
-/// Points that were measured, and those that each step left out; frames may be counted side by side.
+/// Numbers of points that were measured, and that each step left out; frames may be counted in parallel.
 class LeftOut {
  public:
   void start(std::size_t filters) { by_filter_ = std::vector<std::atomic<std::size_t>>(filters); }

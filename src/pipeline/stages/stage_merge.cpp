@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// merge: the maps of several robots as one (docs/method/merging.md; the paper's Algorithm 2). One robot's map
-// goes on as it is.
+// merge: the maps of several robots as one (docs/method/merging.md; the paper's Algorithm 2). The map of a
+// single robot is passed on unchanged.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -43,9 +43,9 @@ class ReadStage : public Stage {
   core::Result<void> process(StageIo& io) override {
     auto frame = source_->read(io.frame());
     if (!frame) {
-      const std::size_t told = unreadable_++;
+      const std::size_t reported = unreadable_++;
       const std::string text = fmt::format("frame {} is skipped: {}", io.frame(), frame.error().message);
-      if (told < kReportedOneByOne) {
+      if (reported < kReportedOneByOne) {
         log_->warning(text);
       } else {
         log_->debug(text);

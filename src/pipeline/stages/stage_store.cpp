@@ -55,7 +55,7 @@ class StoreStage : public Stage {
     header.configuration = context.store.configuration;
     header.input = context.input.text;
     header.program_version = core::version();
-    // Fusing finished maps always starts anew after an interruption.
+    // Fusing finished maps always starts from the beginning after an interruption.
     const auto use =
         context.input.stored_maps != nullptr ? maps::StoreUse::kInOneGo : maps::StoreUse::kGrowing;
     return take(maps::StoreWriter::create(context.output_folder / maps::kStoreFile, header, use));

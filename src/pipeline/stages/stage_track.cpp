@@ -233,7 +233,7 @@ class TrackStage : public Stage {
   /// Path of one robot, for observers.
   struct Way {
     core::KeyframeId component;       ///< component that is reported
-    std::optional<std::size_t> last;  ///< of the frame poses
+    std::optional<std::size_t> last;  ///< index of the latest frame pose
     geometry::Rigid3 odometry_from_camera;
   };
 

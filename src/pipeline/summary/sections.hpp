@@ -19,7 +19,7 @@ using Json = nlohmann::ordered_json;
 /// All sections, in their order, as of a run in which nothing happened.
 Json empty_sections();
 
-/// Numbers are for people: 4 decimals are more than any of them is good for.
+/// Rounds to 4 decimals, more than any reported number is accurate to.
 double rounded(double value);
 
 /// The 4 x 4 matrix, row by row.
@@ -51,9 +51,9 @@ std::string left_out_text(const Json& cloud);
 /// Sentence on points that the merged cloud's filters removed; empty if none.
 std::string left_out_of_map_text(const Json& cloud);
 
-/// More frames have no pose than would be trusted.
+/// Adds a doubt if more frames have no pose than would be trusted.
 void doubt_lost_frames(const Json& summary, std::vector<Doubt>& reasons);
-/// The cloud that was to be made is empty.
+/// Adds a doubt if a cloud was to be made and is empty.
 void doubt_empty_cloud(const Json& summary, std::vector<Doubt>& reasons);
 
 }  // namespace plumbline::pipeline

@@ -25,6 +25,7 @@ void Tap::check(const CheckContext& /*context*/, const core::ConfigMark& mark, c
                 core::ConfigProblems& problems) {
   const auto refuse = [&](std::string what) { problems.push_back({mark, path + ".file", std::move(what)}); };
   const std::string example = (count_ != Count::kOne ? "tap/*" : "tap") + endings_[0];
+
   if (file_.empty()) return refuse(fmt::format("a tap needs a file, e.g. file: {}", example));
 
   const fs::path normal = fs::path(file_).lexically_normal();

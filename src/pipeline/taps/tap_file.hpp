@@ -13,21 +13,22 @@ namespace plumbline::pipeline {
 
 class Tap : public Stage {
  public:
-  enum class Count { kOne, kMany, kFrames };  ///< kFrames: one for every n-th frame, which is an option
+  /// Files that are written; kFrames: one for every n-th frame (option every).
+  enum class Count { kOne, kMany, kFrames };
   /// `endings`: what the name may end with, e.g. {".ply", ".pcd"}.
   Tap(Count count, std::vector<std::string> endings) : count_(count), endings_(std::move(endings)) {}
 
   void declare(core::OptionTable& table) override;
-  /// A path that is absolute, leaves the result folder, has another ending or the wrong number of '*'.
+  /// Reports a path that is absolute, leaves the result folder, has a wrong ending or number of '*'.
   void check(const CheckContext& context, const core::ConfigMark& mark, const std::string& path,
              core::ConfigProblems& problems) override;
   [[nodiscard]] std::vector<std::string> files() const override { return {file_}; }
-  /// Makes the folders.
+  /// Makes the folder of the file.
   core::Result<void> start(const RunContext& context) override;
 
  protected:
   [[nodiscard]] std::string ending() const { return std::filesystem::path(file_).extension().string(); }
-  /// The name with `middle` before its ending: "a/*.png", ".depth" -> "a/*.depth.png".
+  /// The file's path with `middle` before the ending: "a/*.png", ".depth" -> "a/*.depth.png".
   [[nodiscard]] std::string with(const std::string& middle) const;
   [[nodiscard]] bool skips(std::size_t frame) const { return frame % static_cast<std::size_t>(every_) != 0; }
   /// Path of the file; `number` replaces the '*', with six digits. `middle` as in with().
@@ -41,7 +42,7 @@ class Tap : public Stage {
   std::filesystem::path result_folder_;
 };
 
-/// The type of the tap T, named like its port.
+/// The stage type of the tap T, which has the name of the port's type.
 template <typename T>
 StageType tap_type(const PortType& port, std::string help, Mode mode) {
   return stage_type<T>(port.name, std::move(help), mode, {{"in", port}}, {}, true);

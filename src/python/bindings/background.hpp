@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Runs of the library beside Python: the interpreter stays free, and what they say is taken up by the thread
-// that waits.
+// Runs of the library in the background: the interpreter stays free, and the waiting thread collects their
+// messages.
 #include <atomic>
 #include <condition_variable>
 #include <functional>
@@ -25,7 +25,7 @@ namespace plumbline::python {
 
 using LogLine = std::tuple<std::string, std::string>;  ///< level as Python's logging names it, message
 
-/// Keeps messages until somebody asks. Thread-safe.
+/// Keeps messages until they are collected. Thread-safe.
 class QueueLog : public core::Log {
  public:
   void write(core::LogLevel level, const std::string& message) override;
@@ -36,7 +36,7 @@ class QueueLog : public core::Log {
   std::vector<LogLine> lines_;
 };
 
-/// While at least one lives, OpenCV starts no threads of its own; then it has as many as before.
+/// While at least one object lives, OpenCV starts no threads of its own; the last one restores their number.
 class OpenCvThreads {
  public:
   OpenCvThreads();
@@ -51,17 +51,17 @@ class Background {
   using Work = std::function<core::Result<pipeline::RunSummary>(core::Log&, const core::StopToken&,
                                                                 const pipeline::Progress&)>;
   explicit Background(Work work);
-  ~Background();  ///< asks it to stop and waits
+  ~Background();  ///< stops the run and waits for its end
 
   [[nodiscard]] bool done() const { return done_; }
   void request_stop() const { stop_.request_stop(); }
   [[nodiscard]] const core::StopToken& stop() const { return stop_; }
   std::vector<LogLine> messages() { return log_.take(); }
-  /// Frames that are done and how many there are.
+  /// Number of frames done, and of all.
   [[nodiscard]] std::tuple<std::size_t, std::size_t> progress() const { return {frames_, total_}; }
-  /// Waits, with the interpreter free, at most so long. True when the run has ended.
+  /// Waits at most so long, with the interpreter free. True if the run has ended.
   bool wait(double seconds);
-  /// Of a run that has ended: why the result must not be trusted, "" if nothing speaks against it. Throws
+  /// Of a run that has ended: why the result must not be trusted; "": it may be. Throws
   /// Failure.
   std::string reason();
 

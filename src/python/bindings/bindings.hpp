@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Shared by the sources of the module plumbline._core, which is thin: the classes that people use are in
+// Shared by the sources of the module plumbline._core, which is thin: the classes that users need are in
 // Python, beside it.
 #include <pybind11/functional.h>
 #include <pybind11/numpy.h>
@@ -24,7 +24,7 @@ namespace plumbline::python {
 
 namespace py = pybind11;
 
-/// An Error on its way to Python, where it becomes plumbline.InputError and so on.
+/// An Error as an exception, which Python sees as plumbline.InputError and so on.
 struct Failure : std::exception {
   explicit Failure(core::Error e) : error(std::move(e)) {}
   [[nodiscard]] const char* what() const noexcept override { return error.message.c_str(); }
@@ -46,7 +46,7 @@ cv::Mat depth_of(const py::array& array, const std::string& what);
 
 /// 4 x 4, row-major.
 py::array_t<double> matrix_of(const geometry::Rigid3& pose);
-/// Throws Failure (kInput): no 4 x 4 matrix of a rotation and a translation.
+/// Throws Failure (kInput): not a 4 x 4 matrix of a rotation and a translation.
 geometry::Rigid3 pose_of(const py::array& matrix, const std::string& what);
 /// Stamps (N) and matrices (N x 4 x 4).
 py::tuple arrays_of(const geometry::Trajectory& trajectory);
@@ -54,7 +54,7 @@ geometry::Trajectory trajectory_of(
     const py::array_t<double, py::array::c_style | py::array::forcecast>& stamps,
     const py::array_t<double, py::array::c_style | py::array::forcecast>& matrices);
 
-/// A vector that Python owns from here on.
+/// Moves a vector into an array that Python owns.
 template <typename T>
 py::array_t<T> owned(std::vector<T> values, std::vector<py::ssize_t> shape) {
   auto* kept = new std::vector<T>(std::move(values));

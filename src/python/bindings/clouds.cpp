@@ -167,7 +167,7 @@ cloud::FilterChain load_chain(const std::string& chain, bool yaml, const std::fi
   return parsed;
 }
 
-/// The filtered cloud, and for each filter: type, points that it got, points that it gave.
+/// The filtered cloud, and for each filter: type, numbers of points before and after.
 py::tuple filter(const PointCloudPtr& self, const std::string& chain, bool yaml,
                  const std::filesystem::path& folder, int threads) {
   auto result = std::make_shared<PointCloud>();
@@ -190,10 +190,10 @@ py::tuple filter(const PointCloudPtr& self, const std::string& chain, bool yaml,
     result->columns = std::move(made);
   }
 
-  py::list told;
+  py::list steps;
   for (const cloud::FilterReport& report : reports)
-    told.append(py::make_tuple(report.type, report.points_in, report.points_out));
-  return py::make_tuple(result, told);
+    steps.append(py::make_tuple(report.type, report.points_in, report.points_out));
+  return py::make_tuple(result, steps);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include "background.hpp"
 #include "bindings.hpp"
+#include "plumbline/core/config.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/features/frame_features.hpp"
 #include "plumbline/maps/fusion_state.hpp"
@@ -83,6 +84,16 @@ py::tuple read_landmarks(const fs::path& folder) {
                         names_of(stored.stored().header.robots));
 }
 
+/// Section `run` of a result's config.yaml: what was mapped, as text by key. Empty for other files.
+std::map<std::string, std::string> run_settings(const fs::path& file) {
+  const core::ConfigNode root = value_of(core::read_yaml(file));
+  std::map<std::string, std::string> settings;
+  const core::ConfigNode* run = root.find("run");
+  if (run == nullptr) return settings;
+  for (const auto& [key, value] : run->entries) settings[key] = value.scalar;
+  return settings;
+}
+
 /// Frame number of each keyframe, by its robot's name and its number.
 std::map<std::pair<std::string, std::int32_t>, std::int64_t> keyframe_frames(const fs::path& folder) {
   const maps::StoreReader reader = value_of(maps::StoreReader::open(value_of(maps::find_map(folder)).store));
@@ -100,7 +111,7 @@ std::map<std::pair<std::string, std::int32_t>, std::int64_t> keyframe_frames(con
 /// None: not known.
 py::object pose_covariances(const fs::path& folder, const std::string& robot,
                             const py::array_t<double>& stamps, const py::array_t<double>& poses) {
-  constexpr double kRounding_s = 2e-6;  // of the stamps in text files
+  constexpr double kRounding_s = 2e-6;  // rounding of the stamps in text files
   const geometry::Trajectory trajectory = trajectory_of(stamps, poses);
   const maps::StoreReader reader = value_of(maps::StoreReader::open(value_of(maps::find_map(folder)).store));
 
@@ -143,6 +154,7 @@ void add_maps(py::module_& module) {
   module.def("keyframe_frames", &keyframe_frames, py::arg("folder"));
   module.def("pose_covariances", &pose_covariances, py::arg("folder"), py::arg("robot"), py::arg("stamps"),
              py::arg("poses"));
+  module.def("run_settings", &run_settings, py::arg("file"));
   module.def("robot_folders", &robot_folders, py::arg("folder"));
 }
 

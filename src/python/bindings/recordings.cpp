@@ -23,7 +23,7 @@ class Recording {
   }
 
   [[nodiscard]] const dataset::FrameSource& source() const { return *source_; }
-  /// Whole sentences that were not given yet.
+  /// Messages that were not returned yet.
   std::vector<LogLine> messages() { return log_.take(); }
 
  private:
@@ -49,7 +49,7 @@ py::tuple read(const Recording& recording, std::size_t index) {
                         odometry);
 }
 
-/// The same as the camera took it.
+/// The same, not rectified.
 py::tuple stored(const Recording& recording, std::size_t index) {
   const dataset::LiveFrame frame = [&] {
     const py::gil_scoped_release free;

@@ -60,7 +60,7 @@ std::unique_ptr<Background> start_fuse(const std::vector<fs::path>& maps, const 
       });
 }
 
-/// Poses as the tracker gives them, for whoever waits.
+/// Collects the tracker's poses for waiting callers.
 class Poses : public pipeline::RunObserver {
  public:
   void processed(const pipeline::LivePose& pose) override {
@@ -69,7 +69,7 @@ class Poses : public pipeline::RunObserver {
     changed_.notify_all();
   }
 
-  /// None: it has not come within so many seconds.
+  /// None if the pose has not come within so many seconds.
   std::optional<pipeline::LivePose> get(std::size_t index, double seconds) {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, std::chrono::duration<double>(seconds), [&] { return index < poses_.size(); });

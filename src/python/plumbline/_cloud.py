@@ -22,9 +22,9 @@ class FilterReport(NamedTuple):
 
 
 class Cloud:
-    """A point cloud. Its arrays share its memory: nothing is copied, and what is written into them is in the cloud.
+    """A point cloud. Its arrays share its memory: nothing is copied, and writing to them changes the cloud.
 
-    reports  what the filters did, of a cloud that `filter` has made
+    reports  what each filter did, if `filter` made the cloud
     """
 
     def __init__(self, core: _core.PointCloud, reports: Sequence[FilterReport] = ()) -> None:
@@ -40,8 +40,8 @@ class Cloud:
         normals: Optional[npt.ArrayLike] = None,
         columns: Optional[Mapping[str, npt.ArrayLike]] = None,
     ) -> "Cloud":
-        """A cloud of arrays: points N x 3 (metres), colors N x 3 (0-255, red first), normals N x 3, and one number a
-        point in each column. Without colors white, without normals NaN. Raises InputError for other shapes."""
+        """Makes a cloud from arrays: points N x 3 (metres), colors N x 3 (0-255, red first), normals N x 3, and one
+        number per point in each column. Colors default to white, normals to NaN. Raises InputError for other shapes."""
         return cls(_core.PointCloud(
             np.asarray(points, np.float32),
             None if colors is None else np.asarray(colors, np.uint8),
@@ -51,11 +51,11 @@ class Cloud:
 
     @classmethod
     def read(cls, file: PathLike) -> "Cloud":
-        """PLY, PCD, XYZ or CSV. Raises InputError."""
+        """Reads PLY, PCD, XYZ or CSV. Raises InputError."""
         return cls(_core.PointCloud.read(os.fspath(file)))
 
     def write(self, file: PathLike) -> None:
-        """.ply or .pcd, binary, with all columns. Raises ConfigError (another ending), OutputError."""
+        """Writes .ply or .pcd, binary, with all columns. Raises ConfigError (another ending), OutputError."""
         self._core.write(os.fspath(file))
 
     def to_ply(self, file: PathLike) -> None:
@@ -63,7 +63,7 @@ class Cloud:
         self.write(file)
 
     def to_open3d(self) -> Any:
-        """An open3d.geometry.PointCloud with colours and normals (copies). Raises ImportError without Open3D."""
+        """Returns an open3d.geometry.PointCloud with colours and normals (copies). Raises ImportError without Open3D."""
         import open3d  # type: ignore[import]
 
         cloud = open3d.geometry.PointCloud()
@@ -86,7 +86,7 @@ class Cloud:
 
     @property
     def points(self) -> npt.NDArray[np.float32]:
-        """N x 3, metres. Of files with large coordinates `shift` is to be added."""
+        """N x 3, metres. For files with large coordinates, add `shift`."""
         return self._core.points
 
     @property
@@ -106,12 +106,12 @@ class Cloud:
 
     @property
     def columns(self) -> Dict[str, npt.NDArray[Any]]:
-        """One number a point each, by name: confidence (0-1), observations, robot, sigma (m), and others."""
+        """One number per point in each, by name: confidence (0-1), observations, robot, sigma (m), and others."""
         return self._core.columns
 
     @property
     def shift(self) -> npt.NDArray[np.float64]:
-        """3, metres: taken off large coordinates while reading, added again when written."""
+        """3, metres: subtracted from large coordinates when reading, added again when writing."""
         return self._core.shift
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# The compiled part, as mypy sees it; held against the real one by stubtest.
+# The compiled part, as mypy sees it; stubtest compares it with the real one.
 from pathlib import Path
 from typing import Any, Dict, List, Optional, Tuple
 
@@ -187,6 +187,7 @@ def keyframe_frames(folder: Path) -> Dict[Tuple[str, int], int]: ...
 def pose_covariances(
     folder: Path, robot: str, stamps: npt.NDArray[np.float64], poses: npt.NDArray[np.float64]
 ) -> Optional[npt.NDArray[np.float64]]: ...
+def run_settings(file: Path) -> Dict[str, str]: ...
 def robot_folders(folder: Path) -> List[Path]: ...
 def evaluate_trajectory(
     stamps: npt.NDArray[np.float64],

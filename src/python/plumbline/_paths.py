@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the shipped pipelines, cameras, scenes and filter chains are: found from this file."""
+"""Finds the shipped pipelines, cameras, scenes and filter chains, starting from this file."""
 from __future__ import annotations
 
 import functools
@@ -18,4 +18,4 @@ def pipelines() -> Path:
     source = Path(_core.source_pipelines)
     if source.is_dir():
         return source
-    raise _core.ConfigError(f"{Path(__file__).parent}: the shipped pipelines are not beside this module; install it anew")
+    raise _core.ConfigError(f"{Path(__file__).parent}: the shipped pipelines are not beside this module; reinstall it")

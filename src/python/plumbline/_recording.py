@@ -30,13 +30,13 @@ class Frame:
     """One RGB-D pair. The arrays are not copied; keep them as long as you like.
 
     index        number within the recording
-    stamp        of color, seconds
-    depth_stamp  of depth, seconds
+    stamp        time of color, seconds
+    depth_stamp  time of depth, seconds
     color        height x width x 3, uint8, blue first, as OpenCV has it
     depth        height x width: float32, metres along the optical axis, 0 = no measurement;
-                 of a recording opened with raw=True uint16 in units of 1 / camera.depth_scale m
+                 with raw=True: uint16 in units of 1 / camera.depth_scale m
     odometry     4 x 4, world_from_camera by the recorder's own odometry, metres; None: there is none
-    camera       that both images belong to, pixel for pixel (raw=True: before undistortion and registration)
+    camera       camera of both images, pixel for pixel (raw=True: before undistortion and registration)
     """
 
     index: int
@@ -49,7 +49,7 @@ class Frame:
 
 
 class Recording:
-    """A recording: `len`, frames by number, iteration. Made by `open`. Frames may be read from several threads."""
+    """A recording, made by `open`: has `len`, frames by number, and iteration. Several threads may read frames."""
 
     def __init__(self, core: _core.Recording, raw: bool) -> None:
         self._core = core
@@ -60,7 +60,7 @@ class Recording:
         return len(self._core)
 
     def __getitem__(self, index: int) -> Frame:
-        """Raises InputError when this frame cannot be read, IndexError when there is none."""
+        """The frame of that number. Raises InputError if it cannot be read, IndexError if there is none."""
         if index < 0:
             index += len(self)
         if not 0 <= index < len(self):
@@ -70,7 +70,7 @@ class Recording:
         return Frame(number, stamp, depth_stamp, color, depth, odometry, self._camera)
 
     def __iter__(self) -> Iterator[Frame]:
-        """All frames in order. Those that cannot be read are left out, with a warning each, as the program does."""
+        """All frames in order. Those that cannot be read are skipped with a warning, as in the program."""
         for index in range(len(self)):
             try:
                 frame = self[index]
@@ -86,7 +86,7 @@ class Recording:
 
     @property
     def name(self) -> str:
-        """Short: the folder's or the file's."""
+        """Name of the folder or file."""
         return self._core.name
 
     @property
@@ -100,12 +100,12 @@ class Recording:
 
     @property
     def stamps(self) -> npt.NDArray[np.float64]:
-        """Of all frames, seconds."""
+        """Stamps of all frames, seconds."""
         return self._core.stamps
 
     @property
     def truth(self) -> Optional[Trajectory]:
-        """The true path, where one comes with the recording."""
+        """The true path, if the recording has one."""
         arrays = self._core.truth
         return None if arrays is None else Trajectory(*arrays)
 
@@ -125,8 +125,8 @@ def open(  # noqa: A001, as in gzip.open
 ) -> Recording:
     """Opens a folder, a ROS bag, a film or "synth:SCENE?frames=900".
 
-    camera   shipped calibration or file; "": what the recording brings along
-    format   layout, where it is not to be recognised
+    camera   shipped calibration or file; "": the recording's own
+    format   layout; "auto": recognised
     start    seconds after the first frame
     end      seconds after the first frame; None: to the last one
     every    every n-th frame

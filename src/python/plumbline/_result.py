@@ -16,7 +16,7 @@ import numpy.typing as npt
 from . import _core
 from ._cloud import Cloud
 from ._core import Camera
-from ._recording import Frame, open as open_recording
+from ._recording import Frame, Recording, open as open_recording
 from ._trajectory import Trajectory
 from ._values import PathLike
 
@@ -27,8 +27,8 @@ class Keyframes(NamedTuple):
     stamps          N, seconds
     poses           N x 4 x 4, world_from_camera, metres
     numbers         N, as in keyframes.csv and Landmarks; each robot has its own
-    frames          N, numbers of the frames that they were made of; -1: not known (no map.db)
-    sigma_position  N, metres, beside the first keyframe: root of the trace of the covariance; NaN: not known
+    frames          N, numbers of their frames; -1: not known (no map.db)
+    sigma_position  N, metres, relative to the first keyframe: root of the trace of the covariance; NaN: not known
     sigma_rotation  N, radians
     robots          N, names
     """
@@ -46,10 +46,10 @@ class Landmarks(NamedTuple):
     """Points of the sparse map, and M observations of them: their tracks.
 
     points     N x 3, metres, in the frame of the result
-    point      M, which of `points`
+    point      M, index into `points`
     keyframe   M, number of the keyframe that saw it (Keyframes.numbers)
     frame      M, that keyframe's frame
-    pixel      M x 2, where, in the rectified image; (0, 0) is the centre of the first pixel
+    pixel      M x 2, position in the rectified image; (0, 0) is the centre of the first pixel
     robot      M, name of the robot whose keyframe it is
     """
 
@@ -75,13 +75,14 @@ def _matrices(*columns: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 
 
 class Result:
-    """A result folder. What is asked for is read when it is asked for first.
+    """A result folder. Each part is read when it is first used.
 
-    All positions are metres in one frame: z up, 0 on the floor, x along the walls, where these were found.
+    All positions are metres in one frame: z up, 0 on the floor, x along the walls, if these were found.
     """
 
     def __init__(self, folder: PathLike, _kept: Optional["TemporaryDirectory[str]"] = None) -> None:
         self.folder = Path(folder)
+        self._recordings: Dict[str, Recording] = {}
         self._kept = _kept  # a Mapper's own folder lives as long as its result
         self._robot_folders  # raises InputError: not a result
 
@@ -96,7 +97,7 @@ class Result:
 
     @property
     def reason(self) -> str:
-        """Why the result must not be trusted; "" if nothing speaks against it."""
+        """Why the result must not be trusted; "": it may be."""
         return str(self.summary.get("reason", ""))
 
     @property
@@ -105,7 +106,7 @@ class Result:
 
     @functools.cached_property
     def trajectory(self) -> Trajectory:
-        """Poses of the tracked frames, of one robot, with their covariance. Raises InputError for several: see `robots`."""
+        """Tracked poses of a single robot, with their covariance. Raises InputError for several robots: see `robots`."""
         if len(self._robot_folders) > 1:
             names = ", ".join(folder.name for folder in self._robot_folders)
             raise _core.InputError(f"{self.folder}: has the paths of several robots ({names}); they are in .robots")
@@ -113,7 +114,7 @@ class Result:
 
     @functools.cached_property
     def robots(self) -> Dict[str, Trajectory]:
-        """The path of each robot, by its name; of one robot under the name "". """
+        """The path of each robot, by name; a single robot has the name "". """
         if self._robot_folders == [self.folder]:
             return {"": self.trajectory}
         return {folder.name: self._path(folder) for folder in self._robot_folders}
@@ -161,24 +162,49 @@ class Result:
 
     @functools.cached_property
     def landmarks(self) -> Landmarks:
-        """Raises InputError when the result has no map.db (store.enabled=off)."""
+        """Points of the map. Raises InputError if the result has no map.db (store.enabled=off)."""
         points, point, keyframe, frame, pixel, robots, names = _core.read_landmarks(self.folder)
         robot = np.array([names[number] for number in robots], np.str_)
         return Landmarks(points, point, keyframe, frame, pixel, robot)
 
     @functools.cached_property
     def camera(self) -> Camera:
-        """As it was used: given, or what the run found out about it. Of several robots that of the first."""
+        """The camera that was used: as given, or as the run refined it; of several robots the first one's."""
         folder = self._robot_folders[0]
         file = folder / "camera.yaml"
         return Camera.from_yaml((file if file.exists() else self.folder / "camera.yaml").read_text(encoding="utf-8"))
 
-    def image(self, frame: int) -> Frame:
-        """A frame of the recording that this was made from, where that still lies where it did. Raises InputError."""
-        recording = str(self.summary.get("input", ""))
-        return open_recording(recording)[frame]
+    def image(self, frame: int, robot: str = "") -> Frame:
+        """A frame of the mapped recording, by its number in Keyframes and Landmarks; `robot`: one of several.
+
+        Raises InputError if the recording is no longer at its place, or if the result was fused from other maps.
+        """
+        return self._recording(robot)[frame]
+
+    def _recording(self, robot: str) -> Recording:
+        if robot in self._recordings:
+            return self._recordings[robot]
+
+        names = [str(entry["name"]) for entry in self.summary.get("robots", [])]
+        number = names.index(robot) + 1 if robot in names else 1
+        run = _core.run_settings(self.folder / "config.yaml")
+        recording = run.get("input" if number == 1 else f"input{number}", "")
+        if not recording:
+            raise _core.InputError(f"{self.folder}: does not say which recording it was made from; open that one instead")
+
+        topics = {key[len("topic_"):]: value for key, value in run.items() if key.startswith("topic_")}
+        self._recordings[robot] = open_recording(
+            recording, camera=run["camera"], format=run["format"], start=_seconds(run["from"]),
+            end=_seconds(run["to"]) if "to" in run else None, every=int(run["every"]), topics=topics,
+        )
+        return self._recordings[robot]
+
+
+def _seconds(text: str) -> float:
+    """Seconds of a time as config.yaml has it: "2.5 s"."""
+    return float(text.split()[0])
 
 
 def load(folder: PathLike) -> Result:
-    """The result folder of an earlier run. Raises InputError: there is none."""
+    """Opens the result folder of an earlier run. Raises InputError: there is none."""
     return Result(os.fspath(folder))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Mapping: of recordings, of frames as they come, of maps."""
+"""Mapping of recordings and of live frames; merging of maps."""
 from __future__ import annotations
 
 import os
@@ -19,11 +19,11 @@ from ._result import Result
 from ._values import PathLike, overrides, tell
 
 Progress = Callable[[int, int], None]
-_LOOK_UP = 0.05  # seconds between two looks at signals and messages
+_LOOK_UP = 0.05  # seconds between two checks for signals and messages
 
 
 def _finish(run: _core.Background, progress: Optional[Progress] = None) -> None:
-    """Waits for a run. Ctrl-C has it write what it has first, and is raised then."""
+    """Waits for a run. After Ctrl-C the run first writes what it has; then KeyboardInterrupt is raised."""
     interrupted: Optional[KeyboardInterrupt] = None
     shown = (0, 0)
     while True:
@@ -115,7 +115,7 @@ def fuse(
 
 
 class Tracked:
-    """What became of a frame that was fed. Asking for anything but `done` and `dropped` waits for the tracker."""
+    """Result of a frame that was fed. All properties but `done` and `dropped` wait for the tracker."""
 
     def __init__(self, mapper: "Mapper", index: int, dropped: bool = False) -> None:
         self._mapper = mapper
@@ -130,7 +130,7 @@ class Tracked:
 
     @property
     def done(self) -> bool:
-        """Whether the tracker has gone through it; does not wait."""
+        """True if the tracker has processed the frame; does not wait."""
         if self._found is None:
             self._found = self._mapper._run.pose(self.index, 0.0)
         return self._found is not None
@@ -143,7 +143,7 @@ class Tracked:
     @property
     def pose(self) -> Optional[npt.NDArray[np.float64]]:
         """4 x 4, world_from_camera, metres, in the frame of the first camera; None: not tracked. The results of
-        `finish` are optimised, and stand upright in a frame of their own."""
+        `finish` are optimised, and upright in a frame of their own."""
         pose: Optional[npt.NDArray[np.float64]] = self._wait()[1]
         return pose
 
@@ -163,17 +163,17 @@ class Mapper:
             print(mapper.feed(color, depth, stamp).pose)
         result = mapper.finish()
 
-    camera     that the images are of; a Camera, a shipped name or a file
+    camera     camera of the images: a Camera, a shipped name or a file
     pipeline   shipped name or file; with a track stage
     output     result folder; None: a temporary one, which lives as long as the result
-    name       of the robot, in results
-    queue      frames that may wait for the tracker; then `feed` waits, or with drop_late leaves the new one out
-    drop_late  leave frames out instead of letting them wait; `dropped` counts them
+    name       name of the robot in results
+    queue      frames that may wait for the tracker; if it is full, `feed` waits, or with drop_late drops the frame
+    drop_late  drop frames instead of waiting; `dropped` counts them
     threads    0: one per core
-    options    of stages: track={"loops": False} or **{"fuse.voxel": "2 cm"}
+    options    options of stages: track={"loops": False} or **{"fuse.voxel": "2 cm"}
 
-    One thread feeds. As a context manager it gives up what was not finished. After os.fork() use it in the process that
-    made it only; better start processes with the method "spawn".
+    Feed frames from one thread. As a context manager it cancels an unfinished run. After os.fork() use it only in the
+    process that made it; better start processes with the method "spawn".
     """
 
     def __init__(
@@ -213,17 +213,17 @@ class Mapper:
         depth_stamp: Optional[float] = None,
         odometry: Optional[npt.NDArray[np.float64]] = None,
     ) -> Tracked:
-        """Hands in a frame; the arrays are copied.
+        """Feeds a frame; the arrays are copied.
 
         color        height x width x 3, uint8, blue first, or height x width (grey); as the camera took it
         depth        height x width: uint16 in units of 1 / camera.depth_scale m, or float32 in metres (rounded to such
-                     units); 0 and what is not finite is no measurement
-        stamp        of color, seconds, later than the one before
-        depth_stamp  of depth, seconds; None: the same
+                     units); 0 or not finite: no measurement
+        stamp        time of color, seconds, later than the one before
+        depth_stamp  time of depth, seconds; None: the same
         odometry     4 x 4, world_from_camera by the source's own odometry, in a world of its own
 
         Raises InputError: another dtype, shape or size than the camera's, not contiguous, NaN everywhere, a stamp that is
-        not later. The frame is then left out, and others can be fed. Errors of the run itself are raised here, too.
+        not later. The frame is then skipped, and others can be fed. Errors of the run itself are raised here, too.
         """
         self._check()
         while not self._run.wait_for_room(self._queue, 0.0 if self._drop_late else _LOOK_UP):
@@ -236,9 +236,9 @@ class Mapper:
         return Tracked(self, index)
 
     def finish(self, progress: Optional[Progress] = None) -> Result:
-        """No more frames: refines the map, fuses the cloud, writes the results. Again: the same result.
+        """Ends feeding: refines the map, fuses the cloud, writes the results. A second call returns the same result.
 
-        Ctrl-C is raised when what there is has been written. Raises as `map`.
+        After Ctrl-C what there is is written before KeyboardInterrupt is raised. Raises as `map`.
         """
         if self._result is None:
             self._check_process()
@@ -248,7 +248,7 @@ class Mapper:
         return self._result
 
     def cancel(self) -> None:
-        """Gives the run up; nothing is written."""
+        """Cancels the run; nothing is written."""
         if self._result is None:
             self._run.abandon()
             self._run.run.request_stop()
@@ -259,7 +259,7 @@ class Mapper:
 
     @property
     def waiting(self) -> int:
-        """Frames that were fed and not tracked yet."""
+        """Number of frames that were fed and not tracked yet."""
         return self._run.waiting
 
     def __enter__(self) -> "Mapper":
@@ -277,11 +277,11 @@ class Mapper:
     def _check(self) -> None:
         self._check_process()
         if self._result is not None:
-            raise _core.InputError("no frame is taken any more: the mapper has finished")
+            raise _core.InputError("the mapper has finished and accepts no more frames")
         tell(self._run.run.messages())
         if self._run.run.done:
             self._run.run.reason()  # raises what ended it
-            raise _core.InputError("no frame is taken any more: the run has ended")
+            raise _core.InputError("the run has ended and accepts no more frames")
 
     def _pose(self, index: int) -> Optional[Any]:
         found = self._run.pose(index, _LOOK_UP)

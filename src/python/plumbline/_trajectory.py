@@ -32,14 +32,14 @@ class Trajectory:
 
     @classmethod
     def read(cls, file: PathLike) -> "Trajectory":
-        """A file in TUM, EuRoC or KITTI format, or a result folder's trajectory.txt. Raises InputError."""
+        """Reads a file in TUM, EuRoC or KITTI format, or a result folder's trajectory.txt. Raises InputError."""
         path = os.fspath(file)
         if os.path.isdir(path):
             path = os.path.join(path, "trajectory.txt")
         return cls(*_core.read_trajectory(path))
 
     def write(self, file: PathLike) -> None:
-        """TUM format. Raises OutputError."""
+        """Writes TUM format. Raises OutputError."""
         _core.write_trajectory(os.fspath(file), self.stamps, self.poses)
 
     @property
@@ -49,9 +49,9 @@ class Trajectory:
 
     @functools.cached_property
     def covariance(self) -> Optional[npt.NDArray[np.float64]]:
-        """N x 6 x 6, of the position (metres) and of small turns about the world's axes (radians), beside the first
-        keyframe; between keyframes that of the keyframe before. None: not known; results that went through the stage
-        refine and have a map.db know it."""
+        """N x 6 x 6, of the position (metres) and of small rotations about the world's axes (radians), relative to the
+        first keyframe; frames between keyframes have that of the keyframe before. None: not known; it needs the
+        stage refine and a map.db."""
         return None if self._kept is None else _core.pose_covariances(*self._kept, self.stamps, self.poses)
 
     def __len__(self) -> int:

@@ -27,8 +27,8 @@ def text_of(value: Any) -> str:
 
 
 def nested(value: Any) -> str:
-    """The same inside of brackets, where text with blanks of its own is quoted, numbers with units are not."""
-    if isinstance(value, str) and any(sign in value for sign in ",:[]{}#\"'"):
+    """The same inside brackets, where text with special characters is quoted."""
+    if isinstance(value, str) and (not value or any(sign in value for sign in ",:[]{}#\"'")):
         return json.dumps(value)
     return text_of(value)
 
@@ -49,6 +49,6 @@ def option_texts(options: Mapping[str, Any]) -> Dict[str, str]:
 
 
 def tell(messages: Iterable[Tuple[str, str]]) -> None:
-    """Hands what a run says to the logger "plumbline"."""
+    """Passes the messages of a run to the logger "plumbline"."""
     for level, message in messages:
         log.log(getattr(logging, level), "%s", message)

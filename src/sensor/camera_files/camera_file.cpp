@@ -75,7 +75,7 @@ CameraText camera_text(const std::filesystem::path& file, std::string content) {
   return text;
 }
 
-/// A program that is known by name and whose files are not read; "" if it is none.
+/// Name of the program whose files are recognised but cannot be read; "" if not recognised.
 std::string other_program(const CameraText& text) {
   constexpr std::array<std::pair<const char*, const char*>, 6> kWords = {{
       {"fl_x", "nerfstudio or instant-ngp (transforms.json)"},

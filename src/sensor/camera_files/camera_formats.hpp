@@ -64,8 +64,8 @@ std::optional<std::vector<double>> numbers_in(const core::ConfigNode& node);
 /// or what is wrong.
 std::string take_matrix(const std::vector<double>& numbers, Camera& camera);
 /// Puts OpenCV's coefficients, k1 k2 p1 p2 [k3 [k4 k5 k6]], or k1 k2 k3 k4 of a fisheye, into the lens of the
-/// colour image. `model` is the file's word for it, in lower case, "" when it has none. Returns "" or why the
-/// model is none that images can be rectified by.
+/// colour image. `model` is its name in the file, in lower case, or "". Returns "" or why images cannot be
+/// rectified by that model.
 std::string take_coefficients(const std::string& model, const std::vector<double>& numbers, Lens& lens);
 std::string take_coefficients(const std::string& model, const std::vector<double>& numbers, Camera& camera);
 /// Puts fx, fy, cx, cy, and a size if it is there, into the camera; the names are those of ConfigNode

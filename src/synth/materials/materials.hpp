@@ -44,7 +44,7 @@ struct Texture2d {
   std::vector<Level> levels;
 };
 
-/// The material that is really put on: without texture walls wear cloth, floors lino, and the rest is plain.
+/// The material that is used: without texture walls are cloth, floors lino, and the rest is plain.
 Material worn(const Material& material, Texture texture);
 
 /// Draws the texture of a material; `aspect` = width / height of the surface for prints that are not tiled.

@@ -68,6 +68,7 @@ static void wood_board(Canvas canvas, const cv::Vec3f& base, std::uint64_t seed)
   Rng rng(seed, 4);
   const float rings = static_cast<float>(rng.uniform(5.0, 11.0)), phase = static_cast<float>(rng.uniform());
   const cv::Vec3f own = base * rng.uniform(0.8, 1.15);
+
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       const float v = static_cast<float>(y) / static_cast<float>(size.height);
@@ -99,6 +100,7 @@ Canvas draw_planks(const Material& m, cv::Size size, std::uint64_t seed) {
   Canvas canvas(size);
   const int rows = 10, step = size.height / rows;
   Rng rng(seed, 6);
+
   for (int i = 0; i < rows; ++i) {
     const int y0 = i * step, y1 = i + 1 == rows ? size.height : y0 + step;
     const int cut = static_cast<int>(rng.uniform(0.2, 0.8) * size.width);
@@ -110,6 +112,7 @@ Canvas draw_planks(const Material& m, cv::Size size, std::uint64_t seed) {
     }
     cv::line(canvas, {0, y0}, {size.width, y0}, scalar(tone(m) * 0.25F), 2);
   }
+
   modulate(canvas, grain(size, seed + 3), 0.05F);
   return canvas;
 }
@@ -119,6 +122,7 @@ Canvas draw_brick(const Material& m, cv::Size size, std::uint64_t seed) {
   const int rows = 14;
   const double h = static_cast<double>(size.height) / rows, w = size.width / 4.0;
   Rng rng(seed, 7);
+
   for (int i = 0; i < rows; ++i) {
     for (int k = 0; k < 4; ++k) {
       const double x = (k + (i % 2) * 0.5) * w;
@@ -129,6 +133,7 @@ Canvas draw_brick(const Material& m, cv::Size size, std::uint64_t seed) {
       }
     }
   }
+
   modulate(canvas, fractal(size, 48, 48, 3, 0.8F, seed), 0.14F);
   return canvas;
 }
@@ -136,7 +141,8 @@ Canvas draw_brick(const Material& m, cv::Size size, std::uint64_t seed) {
 /// Short creases where the cloth was folded or pulled.
 static void add_creases(cv::Mat1f& field, Rng& rng) {
   cv::Mat1f creases(field.size(), 0.0F);
-  constexpr int kAcross = 7, kDown = 8;  // one in each cell: no seed has many more in view than another
+
+  constexpr int kAcross = 7, kDown = 8;  // one per cell, so that all seeds have about as many in view
   for (int i = 0; i < kAcross * kDown; ++i) {
     cv::Point p(static_cast<int>((i % kAcross + rng.uniform()) * field.cols / kAcross),
                 static_cast<int>((i / kAcross + rng.uniform()) * field.rows / kDown));
@@ -171,13 +177,13 @@ Canvas draw_cloth(const Material& m, cv::Size size, std::uint64_t seed) {
   modulate(canvas, fractal(size, 3, 2, 3, 0.5F, seed), 0.02F);
   const cv::Mat1f sway = fractal(size, 3, 3, 3, 0.45F, seed + 20);
   const cv::Mat1f fade = fractal(size, 9, 3, 2, 0.5F, seed + 30);
+
   Rng rng(seed, 8);
   struct Fold {
     float at, width, depth;
   };
-
   std::vector<Fold> folds;
-  for (int i = 0; i < 16; ++i) {  // spread evenly, as above
+  for (int i = 0; i < 16; ++i) {  // spread evenly, as the creases are
     folds.push_back({static_cast<float>((i + rng.uniform()) / 16.0),
                      static_cast<float>(rng.uniform(0.004, 0.018)),
                      static_cast<float>(rng.uniform(0.015, 0.085) * (rng.uniform() < 0.6 ? 1.0 : -0.6))});

@@ -235,7 +235,7 @@ cv::Mat3b SynthSource::Impl::color(const Stamps& at) const {
 SynthSource::SynthSource(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 SynthSource::~SynthSource() = default;
 
-/// Everything that needs no picture: motion, stamps, and the check of the way.
+/// Everything that needs no picture: motion, stamps, and the check of the path.
 core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_ptr<const World> world,
                                                                    int robot) {
   const SynthOptions& o = world->options;
@@ -290,7 +290,8 @@ core::Result<std::unique_ptr<SynthSource>> SynthSource::create(std::shared_ptr<c
 core::Result<void> check_paths(const Scene& scene, const SynthOptions& options) {
   if (auto ok = check(options); !ok) return ok;
   if (scene.faces.empty() || scene.robots.empty())
-    return core::usage_error(fmt::format("scene '{}' is empty", scene.name));
+    return core::usage_error(
+        fmt::format("scene '{}' has no surfaces or no robot; add `objects:` and `robots:`", scene.name));
   const auto world = std::make_shared<const World>(scene, options);
   for (int robot = 0; robot < options.robots; ++robot) {
     if (auto planned = SynthSource::plan(world, robot); !planned)

@@ -118,7 +118,7 @@ void cast_shadow(cv::Mat1f& depth, float focal_baseline) {
   }
 }
 
-constexpr float kLeastLight = 0.075F;  // less of the projector's light is no measurement
+constexpr float kLeastLight = 0.075F;  // smallest share of the projector's light that gives a measurement
 
 /// Share of the projector's light that comes back: 1 = plenty.
 float light_back(const Material& m, float cosine, float z) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Soft light and shadows, computed once for a grid of nodes on every face: lamps as rectangles with 3 x 3
-// shadow rays, and light without direction dimmed by what stands close (obscurance after Zhukov, Iones,
+// Soft light and shadows, computed once for a grid of nodes on every face: rectangular lamps with 3 x 3
+// shadow rays, and ambient light dimmed by nearby obstacles (obscurance after Zhukov, Iones,
 // Kronin 1998).
 #include <algorithm>
 #include <array>
@@ -15,7 +15,7 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr int kDome = 28;
+constexpr int kDome = 28;       // directions over a face
 constexpr double kReach = 1.6;  // m: obstacles further away do not dim
 
 /// Cosine-weighted directions over +z (Fibonacci spiral).
@@ -35,16 +35,18 @@ const std::array<Vector3d, kDome>& dome() {
 double ambient_at(const World& world, const Vector3d& p, const Face& face) {
   double open = 0.0;
   int insides = 0;
+
   for (const Vector3d& d : dome()) {
     const Vector3d direction = d.x() * face.u_axis + d.y() * face.v_axis + d.z() * face.normal;
     const Hit hit = world.cast(p, direction, kReach);
     if (hit.face >= 0 && !hit.front) ++insides;
     open += std::sqrt((hit.face >= 0 ? hit.distance : kReach) / kReach);
   }
+
   return insides > kDome / 2 ? -1.0 : open / kDome;
 }
 
-/// Nodes inside solids take the mean of their neighbours, so that no darkness leaks out of walls.
+/// Gives nodes inside solids the mean of their neighbours, so that walls are not dark along their edges.
 void fill_hidden(LightMap& map, std::vector<char>& hidden) {
   for (bool changed = true; changed;) {
     changed = false;
@@ -77,6 +79,7 @@ void fill_hidden(LightMap& map, std::vector<char>& hidden) {
   }
 }
 
+/// Light of all lamps at a point.
 double lamps_at(const World& world, const Vector3d& p, const Face& face) {
   double sum = 0.0;
   for (const Lamp& lamp : world.scene.lamps) {
@@ -86,8 +89,8 @@ double lamps_at(const World& world, const Vector3d& p, const Face& face) {
 
     // Behind the face, or too faint to be seen.
     if (to_lamp.dot(face.normal) < -1.0 || lamp.power * area < 0.012 * far2) continue;
-    double part = 0.0;
 
+    double part = 0.0;
     for (int i = -1; i <= 1; ++i) {
       for (int k = -1; k <= 1; ++k) {
         const Vector3d q = lamp.center + 0.66 * (i * lamp.half_u + k * lamp.half_v);

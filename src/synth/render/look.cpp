@@ -134,7 +134,7 @@ class EdgeTiles {
 /// Faces seen at the corners of all tiles, row by row; one more than tiles in both directions.
 cv::Mat1i look_at_corners(RayBatch& rays, int columns, int rows) {
   cv::Mat1i corners(rows + 1, columns + 1);
-  constexpr int kBlock = 4;  // rays that lie close take the same way
+  constexpr int kBlock = 4;  // neighbouring rays take similar paths through the tree
   for (int top = 0; top <= rows; top += kBlock) {
     for (int left = 0; left <= columns; left += kBlock) {
       for (int j = top; j < std::min(top + kBlock, rows + 1); ++j) {

@@ -19,7 +19,7 @@ class CameraPath {
     bool wheeled = false;
     std::uint64_t seed = 1;
     double start_share = 0.0;   ///< of a round, where to begin
-    std::vector<Event> events;  ///< kSpin is motion; others are passed over
+    std::vector<Event> events;  ///< kSpin is motion; others are ignored
   };
   CameraPath(const RobotPath& robot, const Options& options);
 
@@ -42,7 +42,7 @@ class CameraPath {
   };
   [[nodiscard]] Knot knot(long index) const;  ///< any index: wraps or mirrors
   [[nodiscard]] double path_time(double t) const;
-  [[nodiscard]] double pace(double t) const;  ///< 1 = under way, 0 = stands still for a spin
+  [[nodiscard]] double pace(double t) const;  ///< 1: moving along the path; 0: standing still for a spin
   [[nodiscard]] double sway(std::size_t axis, double t) const;
   void add_sway(const Options& options);
 

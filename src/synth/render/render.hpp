@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Pictures of a world from a pose. Const functions, no shared scratch: frames render side by side.
+// Pictures of a world from a pose. Const functions, no shared buffers: frames may be rendered in parallel.
 #include <opencv2/core.hpp>
 #include <optional>
 #include <vector>

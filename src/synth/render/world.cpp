@@ -201,8 +201,9 @@ core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const
                                                        const core::Executor& executor) {
   if (auto ok = check(options); !ok) return tl::unexpected<core::Error>(ok.error());
   if (scene.faces.empty())
-    return core::usage_error(fmt::format("scene '{}': the world is empty", scene.name));
-  if (scene.robots.empty()) return core::usage_error(fmt::format("scene '{}': it has no robots", scene.name));
+    return core::usage_error(fmt::format("scene '{}' has no surfaces; add `objects:`", scene.name));
+  if (scene.robots.empty())
+    return core::usage_error(fmt::format("scene '{}' has no robots; add `robots:`", scene.name));
 
   for (const Face& face : scene.faces) {
     if (find_material(face.material) == nullptr) {

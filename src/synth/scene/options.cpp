@@ -123,8 +123,8 @@ core::Result<std::vector<Event>> parse_events(const std::string& text) {
 
 core::Result<void> check(const SynthOptions& options) {
   if (options.frames == 0)
-    return core::usage_error("frames: zero frames make no recording (-1 = the path once)");
-  if (options.robots < 1) return core::usage_error("robots: at least one");
+    return core::usage_error("frames: zero frames are not a recording (-1: the path once)");
+  if (options.robots < 1) return core::usage_error("robots: at least 1 is needed");
   if (options.width < 64 || options.height < 48)
     return core::usage_error("width, height: at least 64 x 48 pixels");
   if (!(options.fps > 0.0) || !(options.speed > 0.0))

@@ -123,7 +123,7 @@ void FrameAligner::associate_intensity(const AlignmentRound& round) {
   intensity_level_ = round.pyramid_level;
 }
 
-/// Solves for the pose; once more without the intensity terms if they disagree.
+/// Solves for the pose; again without the intensity terms if they disagree.
 void FrameAligner::solve() {
   optimize::PoseSolverOptions solver = in_.options.solver;
   solver.max_iterations = kIterations;

@@ -64,7 +64,8 @@ void FrameAligner::judge() {
   // matches are not mere chance.
   const bool many = feature_inliers() >= 3 * in_.options.min_inliers && result_.min_eigenvalue >= kBlind;
 
-  // A direction that falls short by a little is no chance find yet, though some of the surface does not fit.
+  // A direction that falls short by a little is not yet a chance fit, though some of the surface does not
+  // fit.
   const bool nearly = result_.min_eigenvalue >= kNearlyHeld * limit;
   const bool all_surface =
       by_surface && result_.surface_share > (nearly ? kMostOfTheSurface : kAllTheSurface);

@@ -25,7 +25,7 @@ std::vector<optimize::PointTerm> point_terms(const maps::Map& map, const std::ve
     const float depth = features.depth_beside(static_cast<std::size_t>(match.feature), match.shift);
     if (depth > 0.0F) {
       term.depth = static_cast<double>(depth);
-      // The landmark's own depth is no better than the measurement.
+      // The landmark's depth is no more accurate than the measurement.
       term.depth_sigma = std::sqrt(2.0) * sensor::depth_sigma(term.depth);
     }
 

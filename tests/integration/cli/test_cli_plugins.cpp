@@ -59,7 +59,8 @@ TEST_F(Plugins, WhatDoesNotFitIsRefusedWithItsReason) {
   write("text.so", "not a shared object\n");
   const std::map<std::string, std::string> reasons = {
       {plugin("foreign"), "is not a Plumbline plugin: it has no plumbline_filter_plugin"},
-      {plugin("stranger"), "is not a Plumbline plugin: its plumbline_filter_plugin says something else"},
+      {plugin("stranger"),
+       "is not a Plumbline plugin: its plumbline_filter_plugin was not made by PLUMBLINE_FILTER_PLUGIN"},
       {plugin("old"), "was built for filter interface 0, this program has"},
       {plugin("other_libraries"), "was built with plumbline 0.0.1, PCL 1.12.1, Eigen alignment 32"},
       {plugin("nothing"), "adds no filters"},

@@ -191,6 +191,23 @@ TEST_F(Bags, OfADamagedChunkOnlyItsFramesAreLost) {
   EXPECT_THAT(why + log_.warnings, AllOf(HasSubstr("damaged.mcap"), HasSubstr("chunk")));
 }
 
+TEST_F(Bags, AnUnknownCompressionIsNamed) {
+  write_large(6);
+  copy("whole.mcap");
+  std::string bytes = bytes_of("whole.mcap");
+  std::size_t renamed = 0;
+  for (std::size_t at = bytes.find("zstd"); at != std::string::npos; at = bytes.find("zstd", at)) {
+    bytes.replace(at, 4, "lzma");
+    ++renamed;
+  }
+  ASSERT_GT(renamed, 0U);
+  write_text("other.mcap", bytes);
+
+  const auto source = open_path("other.mcap");
+  const std::string message = source ? log_.warnings : source.error().message;
+  EXPECT_THAT(message, AllOf(HasSubstr("other.mcap"), HasSubstr("compressed by 'lzma' (known: zstd, lz4)")));
+}
+
 /// A bag with a topic or two, of one image each.
 class Topics : public Bags {
  protected:

@@ -28,7 +28,7 @@ std::vector<double> values_of(const CsvTable& table, std::size_t column) {
   return values;
 }
 
-/// The stages that take most time of a frame.
+/// The stages that take most time per frame.
 std::vector<TimedColumn> slowest_stages(const CsvTable& table) {
   constexpr std::size_t kMost = 5;
   constexpr double kWorthShowing_ms = 0.5;
@@ -38,10 +38,12 @@ std::vector<TimedColumn> slowest_stages(const CsvTable& table) {
     const bool stage =
         name.size() > 3 && name.substr(name.size() - 3) == "_ms" && name.find('.') == std::string::npos;
     if (!stage) continue;
+
     TimedColumn column{name.substr(0, name.size() - 3), values_of(table, c), 0.0};
     column.median = core::quantile(column.values, 0.5);
     if (core::quantile(column.values, 0.95) >= kWorthShowing_ms) columns.push_back(std::move(column));
   }
+
   const auto slower = [](const TimedColumn& a, const TimedColumn& b) { return a.median > b.median; };
   std::stable_sort(columns.begin(), columns.end(), slower);
   if (columns.size() > kMost) columns.resize(kMost);
@@ -98,7 +100,7 @@ std::string stages_table(const Json& summary) {
   return table.html();
 }
 
-/// Description of a result's file by the end of its name.
+/// Description of a file of the result, found by the end of its name.
 std::string what_is(const std::string& name) {
   struct Known {
     const char* name;
@@ -164,9 +166,9 @@ std::string configuration_html(const ReportData& data) {
 std::string files_html(const ReportData& data, const fs::path& left_out) {
   constexpr std::size_t kMost = 400;
   std::vector<std::pair<std::string, double>> files;
-  std::error_code ec;
-
   double all = 0.0;
+
+  std::error_code ec;
   for (fs::recursive_directory_iterator it(data.folder, ec), end; !ec && it != end; it.increment(ec)) {
     std::error_code problem;
     const std::string name = it->path().lexically_relative(data.folder).generic_string();

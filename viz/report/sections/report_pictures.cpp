@@ -25,7 +25,7 @@ constexpr std::array<Caption, 7> kCaptions{{{"iso", "Obliquely; surfaces that fa
                                             {"right", "From the right, true to scale"},
                                             {"bottom", "From below, true to scale"}}};
 
-/// Empty when the file is no whole PNG.
+/// Empty if the file is not a complete PNG.
 std::string picture_html(const fs::path& file, const std::string& caption) {
   const std::string bytes = read_bytes(file);
   const bool whole = bytes.rfind("\x89PNG\r\n\x1a\n", 0) == 0 && bytes.size() > 20 &&

@@ -87,7 +87,7 @@ class RobotCharts {
     }
     return values;
   }
-  /// Standard deviation of the pose along the direction that is held worst, rotations scaled to 2 m.
+  /// Standard deviation of the pose along the least constrained direction, rotations scaled to 2 m.
   [[nodiscard]] std::vector<double> weakest_mm() const {
     std::vector<double> values = column("min_eigenvalue");
     for (double& v : values) v = v > 0.0 ? 1e3 / std::sqrt(v) : kNaN;

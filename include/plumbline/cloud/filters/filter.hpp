@@ -30,7 +30,7 @@ struct FilterContext {
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();
   /// Distance of neighbouring points, metres, if it is known (the voxel of a fused cloud); 0: unknown.
   double spacing_m = 0.0;
-  std::uint32_t seed = 0;  ///< of random choices
+  std::uint32_t seed = 0;  ///< seed of random choices
   /// Threads for the filters that can use several; without it one. Results do not depend on it.
   const core::Executor* executor = nullptr;
   /// Number of this run among many ("12"): part of the names of files that filters write. Empty: the only

@@ -47,7 +47,7 @@ class FilterChain {
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] std::size_t size() const { return filters_.size(); }
-  [[nodiscard]] std::vector<std::string> types() const;  ///< of the filters, in their order
+  [[nodiscard]] std::vector<std::string> types() const;  ///< types of the filters, in their order
   /// The chain with every option spelt out, as YAML that `load` accepts.
   [[nodiscard]] std::string to_yaml() const;
 
@@ -65,7 +65,7 @@ class FilterChain {
   core::Result<CloudPtr> apply(CloudConstPtr input, const FilterContext& context = {},
                                std::vector<FilterReport>* reports = nullptr,
                                const ChainProgress& progress = {}) const;
-  /// The same for a fused cloud and its columns; an empty chain hands them on.
+  /// The same for a fused cloud and its columns; an empty chain returns both unchanged.
   core::Result<FusedCloud> apply(FusedCloud fused, double spacing_m, const core::Executor& executor,
                                  std::vector<FilterReport>* reports = nullptr) const;
 

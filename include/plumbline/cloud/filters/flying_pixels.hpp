@@ -58,11 +58,11 @@ class FlyingPixels : public ChoosingFilter<PointT> {
  private:
   struct Marks {
     std::vector<std::uint8_t> jump;        ///< 1: at a depth jump
-    std::vector<std::uint8_t> neighbours;  ///< of 8, those on the same surface
+    std::vector<std::uint8_t> neighbours;  ///< number of the 8 neighbours on the same surface
   };
   struct View {
     Eigen::Vector3f ray{0, 0, 1};  ///< unit, from the viewpoint
-    float noise = 0.0F;            ///< metres along the ray that are no jump
+    float noise = 0.0F;            ///< metres along the ray below which there is no jump
   };
 
   /// Looks at every pair of neighbours once.

@@ -10,7 +10,7 @@
 
 namespace plumbline::cloud {
 
-/// Cells within +-2^20 of the origin as numbers, in order of x, then y, then z.
+/// A cell within +-2^20 of the origin as a number; numbers are ordered by x, then y, then z.
 inline std::uint64_t pack_cell(const Eigen::Vector3i& cell) {
   std::uint64_t key = 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -28,10 +28,10 @@ inline Eigen::Vector3i unpack_cell(std::uint64_t key) {
   return cell;
 }
 
-/// The cell that a place lies in; both in the unit of cells.
+/// The cell that contains a position; the position is in units of cells.
 inline Eigen::Vector3i cell_of(const Eigen::Vector3d& at) { return at.array().floor().cast<int>(); }
 
-/// Axis nearest to a normal, and direction along it: 0-5.
+/// Number (0-5) of the axis nearest to a normal and the direction along it.
 template <typename Normal>
 int facing(const Normal& normal) {
   Eigen::Index axis = 0;

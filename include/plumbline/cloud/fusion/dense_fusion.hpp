@@ -36,8 +36,8 @@ struct DenseFusionOptions {
 struct FusionReport {
   std::size_t tiles = 0;
   std::size_t seen_through = 0;  ///< points removed since views look through them
-  std::size_t isolated = 0;      ///< points removed as too lonely
-  double least_gain = 1.0;       ///< of the colours of a view
+  std::size_t isolated = 0;      ///< points removed as isolated
+  double least_gain = 1.0;       ///< smallest colour gain of a view
   double most_gain = 1.0;
 };
 
@@ -48,11 +48,11 @@ using ReadView = std::function<core::Result<CloudPtr>(std::size_t)>;
 /// Name of the column that says how exactly a point is known along its normal: standard deviation, metres.
 inline constexpr const char* kSigmaColumn = "sigma";
 
-/// The views of a whole run. All vectors: one entry a view. Where a cloud's sensor was as seen from its
-/// camera, the cloud says (sensor_pose).
+/// The views of a whole run; all vectors have one entry per view. A cloud holds the pose of its sensor
+/// relative to the camera (sensor_pose).
 struct FusionViews {
   std::vector<geometry::Rigid3> world_from_camera;
-  std::vector<sensor::Pinhole> cameras;  ///< that the clouds were taken with
+  std::vector<sensor::Pinhole> cameras;  ///< camera of each cloud
   std::vector<std::uint8_t> robots;  ///< robot of each view, 0-254; empty: one robot, and no columns.robot
   ReadView read;
   /// Covariances of (rho, phi) in Exp(rho, phi) camera_from_world, metres and radians; empty: not known, and

@@ -16,16 +16,16 @@ namespace plumbline::cloud {
 struct ColorCell {
   std::uint64_t cell = 0;          ///< pack_cell()
   Eigen::Vector3f color{0, 0, 0};  ///< red, green, blue, 0-255
-  float points = 0.0F;             ///< that count for the colour: dark and saturated ones do not
+  float points = 0.0F;             ///< number averaged; dark and saturated points are left out
 };
 
-/// Cubes of `cell_m` that the points of a view lie in, by cell.
+/// Mean colours of a view in cubes of `cell_m`, sorted by cell.
 std::vector<ColorCell> color_cells(const Cloud& camera_cloud, const geometry::Rigid3& world_from_camera,
                                    double cell_m);
 
-/// Factors of red, green and blue for every view that make the views agree on shared cubes, their geometric
-/// mean 1: robust least squares over logarithms, drawn towards 1 where little is shared, within 0.5 to 2.
-/// Views without anything shared get 1.
+/// Factors of red, green and blue for every view that make the views agree on shared cubes: robust least
+/// squares over logarithms, with geometric mean 1, drawn towards 1 where little is shared, limited to 0.5 to
+/// 2. Views that share nothing get 1.
 std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell>>& views);
 
 /// Multiplies the colours in place.

@@ -20,15 +20,15 @@ struct DepthRaster {
   int width = 0;
   int height = 0;
   std::vector<std::uint16_t> nearest;  ///< millimetres, 0: none
-  float furthest_m = 0.0F;             ///< of all cells
-  sensor::Pinhole camera;              ///< that took the view
+  float furthest_m = 0.0F;             ///< largest depth of all cells
+  sensor::Pinhole camera;              ///< camera that took the view
 };
 
 /// From a view's cloud, camera frame.
 DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camera);
 
-/// A look: what a frame says of the space before it, and nothing else. The nearest depth of each cell of a
-/// raster, as an organised cloud (metres, camera frame) without normals and colours; cells without a
+/// Depth view of a frame, for testing free space only: the nearest depth of each cell of a raster, as an
+/// organised cloud (metres, camera frame) without normals and colours; cells without a
 /// measurement within [min_depth_m, max_depth_m] are NaN.
 CloudPtr depth_view(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera, double min_depth_m,
                     double max_depth_m);

@@ -21,7 +21,7 @@ namespace plumbline::cloud {
 struct Surfel {
   Eigen::Vector3i block{0, 0, 0};
   Eigen::Vector3f normal_sum{0, 0, 0};
-  float normal_length = 0.0F;      ///< of normal_sum; set by fit_planes()
+  float normal_length = 0.0F;      ///< length of normal_sum; set by fit_planes()
   Eigen::Vector3f first{0, 0, 0};  ///< weighted sum of positions
   Eigen::Matrix3f second;          ///< weighted sum of their outer products
   float weight = 0.0F;

@@ -35,7 +35,7 @@ struct FusedPoint {
   float spread_m = 0.0F;           ///< standard deviation of the measurements along the normal
   float noise_m = 0.0F;            ///< standard deviation that the sensor's noise lets one measurement have
   std::uint32_t observations = 0;  ///< views that saw it
-  std::uint32_t robot = 0;         ///< that measured it most, 0-254
+  std::uint32_t robot = 0;         ///< robot that measured it most, 0-254
   std::uint32_t robot_lead = 0;    ///< measurements of `robot`, less those of all others
 };
 

@@ -34,17 +34,16 @@ struct CloudColumns {
 
 /// Binary PLY: float x y z nx ny nz, uchar red green blue [, float confidence, int observations, uchar
 /// robot, float others...]; opens with colours and normals in PCL, Open3D, MeshLab and CloudCompare. Points
-/// with a NaN coordinate are left out, unknown normals written as 0 0 0. Same cloud, same bytes. A `shift`
-/// (CloudFile::shift) is added to the positions, which are doubles then. `comments`: lines for the header.
-/// Errors (kOutput) name the file; it appears whole or not at all.
+/// with a NaN coordinate are left out, unknown normals are written as 0 0 0. The same cloud gives the same
+/// bytes. A `shift` (CloudFile::shift) is added to the positions, which are then written as doubles.
+/// `comments`: lines for the header. Errors (kOutput) name the file, which appears whole or not at all.
 core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& cloud,
                              const CloudColumns& columns = {},
                              const Eigen::Vector3d& shift = Eigen::Vector3d::Zero(),
                              const std::vector<std::string>& comments = {});
 
 /// Binary PCD v0.7: x y z rgb normal_x normal_y normal_z curvature [, confidence, observations, robot,
-/// others]. An
-/// organised cloud stays organised and keeps its NaN points; an unorganised one loses them.
+/// others]. An organised cloud stays organised and keeps its NaN points; an unorganised one loses them.
 core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& cloud,
                              const CloudColumns& columns = {},
                              const Eigen::Vector3d& shift = Eigen::Vector3d::Zero());
@@ -57,19 +56,19 @@ core::Result<void> write_cloud(const std::filesystem::path& file, const Cloud& c
 struct CloudFile {
   CloudPtr cloud;  ///< without colour: 255 255 255; without normals: NaN normals
   CloudColumns columns;
-  /// Taken off all positions while reading: a point is at `shift` + its coordinates. Not zero only with
+  /// Subtracted from all positions while reading: a point is at `shift` + its coordinates. Zero without
   /// LargeCoordinates::kShifted.
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();
   bool has_color = false;
   bool has_normals = false;
-  std::size_t nan_points = 0;   ///< with a coordinate that is not finite; kept in `cloud`
+  std::size_t nan_points = 0;   ///< points with a coordinate that is not finite; kept in `cloud`
   std::size_t nan_normals = 0;  ///< points whose normal is unknown (NaN or zero) though the file has normals
 };
 
-/// Treatment of coordinates, such as UTM's, that have more digits than a float.
+/// Treatment of coordinates with more digits than a float has, such as UTM's.
 enum class LargeCoordinates {
   kRounded,  ///< to the nearest float
-  kShifted   ///< whole metres near their middle are taken off first: CloudFile::shift
+  kShifted   ///< whole metres near their middle are subtracted first: CloudFile::shift
 };
 
 /// Moves a cloud that was read with one shift into the frame of one with another.
@@ -79,7 +78,7 @@ void change_shift(Cloud& cloud, const Eigen::Vector3d& from, const Eigen::Vector
 /// z, then 0-255 red green blue and/or nx ny nz; separated by blanks, commas or semicolons; a CSV header line
 /// names columns). Columns with other names are kept as 32 bit floats (lists, arrays and alpha are not).
 /// Errors (kInput): missing, empty, not this format, without x y z, truncated, header promising more points
-/// than the file holds (found before memory is taken).
+/// than the file holds (detected before memory is allocated).
 core::Result<CloudFile> read_cloud(const std::filesystem::path& file,
                                    LargeCoordinates large = LargeCoordinates::kRounded);
 

@@ -12,7 +12,7 @@
 namespace plumbline::cloud {
 
 struct MeshOptions {
-  double resolution_m = 0.02;  ///< of the mesh; finer where the cloud allows is not better than this
+  double resolution_m = 0.02;  ///< edge length of the mesh; finer ones are not better
   double reach_m = 0.05;       ///< surface further than this from every point is guessed and left out
 
   void declare(core::OptionTable& table);

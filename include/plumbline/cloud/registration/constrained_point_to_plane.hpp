@@ -15,7 +15,7 @@ namespace plumbline::cloud {
 /// the points and scaled by their spread, so that all six numbers are metres: (rho + phi x centre, lever phi)
 /// of xi = (rho, phi).
 struct PlaneStep {
-  Eigen::Matrix4d transformation = Eigen::Matrix4d::Identity();  ///< of the source
+  Eigen::Matrix4d transformation = Eigen::Matrix4d::Identity();  ///< transform of the source
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double lever = 1.0;
   /// Eigenvalues of the information, 1/m^2.
@@ -23,7 +23,7 @@ struct PlaneStep {
   Eigen::Matrix<double, 6, 6> directions = Eigen::Matrix<double, 6, 6>::Identity();  ///< its eigenvectors
   std::array<bool, 6> held{};  ///< the others were left alone
   int inliers = 0;
-  double rms = 0.0;  ///< of these, in standard deviations
+  double rms = 0.0;  ///< RMS of these, in standard deviations
 };
 
 /// For pcl::IterativeClosestPoint::setTransformationEstimation. Residuals lie along the mean of both normals,

@@ -15,9 +15,9 @@
 
 namespace plumbline::mapping {
 
-/// Report of one adjustment; the times are for people, nothing is decided by them.
+/// Report of one adjustment; the times are informative only, no decision depends on them.
 struct BundleReport {
-  core::KeyframeId keyframe;  ///< keyframe in its centre; invalid: nothing was put back
+  core::KeyframeId keyframe;  ///< keyframe at its centre; invalid: nothing was put back
   optimize::BundleSummary summary;
   std::optional<Contradiction> refused;  ///< reason for not putting it back
   double wait_ms = 0.0;                  ///< waiting time of the tracker
@@ -38,10 +38,10 @@ class BackgroundBundle {
   void request(const maps::Map& map, core::KeyframeId keyframe, std::int64_t frame);
   /// True if the bundle is to be put back at this frame.
   [[nodiscard]] bool due(std::int64_t frame) const { return running_ != nullptr && frame >= running_->due; }
-  /// Waits for the bundle under way, puts it back, and starts the next one if requested. Returns what moved;
+  /// Waits for the running bundle, puts it back, and starts the next one if requested. Returns what moved;
   /// nothing if the bundle was not used.
   std::optional<MapCorrection> commit(maps::Map& map, std::int64_t frame, BundleReport& report);
-  /// True if no bundle is under way or requested.
+  /// True if no bundle is running or requested.
   [[nodiscard]] bool idle() const { return running_ == nullptr && waiting_.empty(); }
   /// Bundles that would have torn the map, and were not put into it.
   [[nodiscard]] int refused() const { return refused_; }

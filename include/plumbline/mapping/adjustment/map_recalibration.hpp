@@ -20,14 +20,14 @@
 
 namespace plumbline::mapping {
 
-/// Changes the map of one robot, and the poses of its frames relative to keyframes, from the camera that was
-/// believed before to the one believed now: features, surfaces, edges and the tracker's own steps become what
-/// that camera measured, keyframes and landmarks go to where these put them.
+/// Changes the map of one robot, and the poses of its frames relative to keyframes, from the previous camera
+/// to the new one: features, surfaces, edges and the tracker's steps are recomputed as the new camera would
+/// have measured them, and keyframes and landmarks are moved accordingly.
 void recalibrate_map(const sensor::Recalibration& change, maps::Map& map,
                      std::vector<maps::FramePose>& frames);
 
-/// A keyframe's picture again, by its number in the recording, as the camera believed now took it; none: it
-/// cannot be read. Called from several threads at a time.
+/// Reads a keyframe's picture again, by its number in the recording, with the new camera; none: it cannot be
+/// read. Called from several threads at a time.
 using PictureReader = std::function<std::optional<sensor::RgbdFrame>(std::int64_t frame_index)>;
 
 struct SurfaceMeasurement {
@@ -36,20 +36,20 @@ struct SurfaceMeasurement {
   bool photometric = true;    ///< grey values, too
 };
 
-/// Measures surfaces of keyframes and the edges between them again, in the pictures themselves. What cannot
-/// be read or aligned again stays as recalibrate_map left it.
+/// Measures surfaces of keyframes and the edges between them again, in the pictures themselves. Those that
+/// cannot be read or aligned stay as recalibrate_map left them.
 void measure_surfaces_again(const sensor::Pinhole& camera, const std::vector<maps::FramePose>& frames,
                             const PictureReader& read, const SurfaceMeasurement& how,
                             const core::Executor& executor, maps::Map& map);
 
-/// Landmarks are searched in all keyframes that should see them, because a wrong camera made the tracker
-/// reject some; then the whole map is adjusted.
+/// Searches landmarks in all keyframes that should see them, because a wrong camera made the tracker
+/// reject some; then adjusts the whole map, which must not be empty.
 GlobalAdjustmentSummary adjust_recalibrated_map(const sensor::Pinhole& camera, const FusionOptions& fusion,
                                                 const GlobalAdjustmentOptions& adjustment, maps::Map& map);
 
 /// Solves the poses of frames between keyframes again, from the landmarks that each of them saw
 /// (FramePose::seen) and its pose as recalibrate_map left it, which counts for less the more it was
-/// corrected. `model`: the camera believed now; `before`, `path_before`: the same frames and their path
+/// corrected. `model`: the new camera; `before`, `path_before`: the same frames and their path
 /// before recalibrate_map. The map is not changed.
 void solve_frames_again(const sensor::ImageModel& model, const maps::Map& map,
                         const std::vector<maps::FramePose>& before, const geometry::Trajectory& path_before,

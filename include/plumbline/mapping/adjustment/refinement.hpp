@@ -25,9 +25,9 @@ struct RefinementOptions {
 struct RefinementSummary {
   std::size_t local_maps = 0;
   std::size_t tried = 0;      ///< alignments of two local maps
-  std::size_t accepted = 0;   ///< of these, used
-  std::size_t rejected = 0;   ///< of the accepted, rejected by the pose graph
-  double mean_rms = 0.0;      ///< of the accepted, standard deviations of the depth noise
+  std::size_t accepted = 0;   ///< alignments that were used
+  std::size_t rejected = 0;   ///< accepted alignments that the pose graph rejected
+  double mean_rms = 0.0;      ///< mean residual of the accepted, standard deviations of the depth noise
   double mean_shift_m = 0.0;  ///< mean motion of the keyframes
   double max_shift_m = 0.0;
   std::size_t refused = 0;      ///< solutions that would have torn the map
@@ -37,7 +37,7 @@ struct RefinementSummary {
 
 struct Refinement {
   RefinementSummary summary;
-  std::vector<KeyframeAccuracy> accuracy;  ///< of the keyframes, by id; empty: not known
+  std::vector<KeyframeAccuracy> accuracy;  ///< accuracy of the keyframes, by id; empty: not known
 };
 
 /// Moves keyframes and landmarks of `map` to where they and the surfaces of its local maps fit best.

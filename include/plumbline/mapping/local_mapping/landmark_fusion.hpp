@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Makes one landmark of one thing in the world: landmarks are searched in the images of keyframes that should
-// see them and did not (docs/method/mapping.md).
+// Merges duplicate landmarks and adds missing observations: landmarks are searched in the images of keyframes
+// that should see them and did not (docs/method/mapping.md).
 #include <cstdint>
 #include <map>
 #include <vector>
@@ -15,16 +15,16 @@
 namespace plumbline::mapping {
 
 struct FusionOptions {
-  int keyframes = 10;      ///< neighbours, each way
-  double radius_px = 4.0;  ///< around the projection, at octave 0
+  int keyframes = 10;      ///< largest number of neighbours
+  double radius_px = 4.0;  ///< search radius around the projection, at octave 0
   tracking::AssociationOptions association;
 
   void declare(core::OptionTable& table);
 };
 
 struct FusionSummary {
-  int observed = 0;  ///< observations that were missing
-  int merged = 0;    ///< duplicate landmarks
+  int observed = 0;  ///< observations added
+  int merged = 0;    ///< duplicate landmarks removed
 };
 
 /// Landmarks of `keyframe` are projected into each of `neighbours`, and the neighbours' landmarks into
@@ -38,7 +38,7 @@ FusionSummary fuse_points(maps::Map& map, core::KeyframeId keyframe,
                           const std::map<std::int32_t, sensor::Pinhole>& cameras,
                           const FusionOptions& options);
 
-/// The same for lines. A merged line spans what both spanned.
+/// The same for lines. A merged line covers the extent of both.
 FusionSummary fuse_lines(maps::Map& map, core::KeyframeId keyframe,
                          const std::vector<core::KeyframeId>& neighbours,
                          const std::map<std::int32_t, sensor::Pinhole>& cameras,

@@ -24,30 +24,30 @@ struct PlacePair {
 };
 
 struct ConsistencyOptions {
-  double max_apart_m = 0.15;       ///< largest distance between a camera's poses by two pairs ...
-  double max_turned_rad = 0.06;    ///< ... and turn it
-  double apart_per_metre = 0.02;   ///< more for every metre between them: the maps themselves drift
-  double turned_per_metre = 0.01;  ///< rad
+  double max_apart_m = 0.15;       ///< largest distance between the poses that two pairs give one camera
+  double max_turned_rad = 0.06;    ///< largest rotation between them
+  double apart_per_metre = 0.02;   ///< added per metre between the two pairs, because maps drift
+  double turned_per_metre = 0.01;  ///< added per metre, radians
   std::size_t max_sets = 5;        ///< largest number of sets to find
-  int budget = 200000;             ///< steps of the search for each set; then the best so far is taken
+  int budget = 200000;             ///< steps of the search for each set; the best set found by then is used
 };
 
-/// Pairs of which every two agree.
+/// Pairs of which every two are consistent.
 struct ConsistentSet {
   std::vector<std::size_t> members;  ///< indices of the pairs, ascending
-  std::size_t keyframes_a = 0;       ///< different keyframes of A among them
-  std::size_t keyframes_b = 0;
+  std::size_t keyframes_a = 0;       ///< number of different keyframes of A
+  std::size_t keyframes_b = 0;       ///< number of different keyframes of B
   double span_m = 0.0;  ///< largest distance between two members' cameras, in the map where it is smaller
 };
 
-/// True if two pairs are consistent: the pose of the other one's keyframes, found by way of each, is the same
-/// within the limits. The maps give the relative poses of A's keyframes and of B's.
+/// True if two pairs are consistent: either pair, together with the maps' relative poses of A's and of B's
+/// keyframes, gives the relative pose of the other pair within the limits.
 bool agree(const maps::Map& map_a, const maps::Map& map_b, const PlacePair& one, const PlacePair& two,
            const ConsistencyOptions& options);
 
-/// Consistent sets, the largest first. What agrees with half of a set belongs to it
-/// and founds no set of its own, so that sets[1] is the strongest alternative of sets[0]. Empty for no pairs;
-/// a pair that agrees with no other is a set of one. The same input in the same order gives the same answer.
+/// Consistent sets, the largest first. A pair that agrees with half of a set is not used for later sets, so
+/// that sets[1] is the strongest alternative to sets[0]. Empty for no pairs; a pair that agrees with no other
+/// is a set of one. The same input in the same order gives the same answer.
 std::vector<ConsistentSet> consistent_sets(const maps::Map& map_a, const maps::Map& map_b,
                                            const std::vector<PlacePair>& pairs,
                                            const ConsistencyOptions& options);

@@ -47,12 +47,12 @@ struct LoopOptions {
 
 struct LoopCounts {
   int candidates = 0;  ///< places that looked like one seen before and were verified
-  int verified = 0;    ///< with success
+  int verified = 0;    ///< candidates that were verified successfully
   int accepted = 0;    ///< loops that moved the map
   int rejected = 0;    ///< edges that the pose graph rejected
   int refused = 0;     ///< closings that would have torn the map
   int located = 0;     ///< frames of a lost tracker that another robot's map knew
-  int by_others = 0;   ///< loops by way of another robot's map that moved this one
+  int by_others = 0;   ///< loops through another robot's map that moved this one
 };
 
 /// A verified pair of keyframes.
@@ -65,20 +65,20 @@ struct Loop {
 /// One candidate that was verified, and what became of it.
 struct LoopTrial {
   Loop loop;
-  double score = 0.0;         ///< of the images
+  double score = 0.0;         ///< similarity of the images
   double correction_m = 0.0;  ///< motion of the query if the loop is closed; 0: there is no pose
   double correction_rad = 0.0;
-  double path_m = 0.0;     ///< from the match to the query, along the keyframes
+  double path_m = 0.0;     ///< length of the path from match to query, along the keyframes
   bool by_others = false;  ///< query and match were both seen in another robot's map, not in each other
-  bool closed = false;     ///< the pose graph believed it, and the map was moved
-  std::string refused;     ///< why it is no loop; empty: it passed
+  bool closed = false;     ///< the pose graph accepted it, and the map was moved
+  std::string refused;     ///< reason why it is not a loop; empty: it passed
 };
 
 /// Loops that were verified, agree with one another and are more than drift explains: the path is wrong
 /// somewhere between, or places look alike.
 struct LoopDispute {
   std::vector<Loop> loops;
-  LoopTrial strongest;  ///< of the loops, the one with most landmarks
+  LoopTrial strongest;  ///< the loop with most landmarks
 };
 
 /// Verified loops that wait for others to agree with them.
@@ -115,7 +115,7 @@ class LoopCloser {
   /// map.
   void restore(const maps::Map& map, core::KeyframeId newest);
 
-  /// From now on detect() finds loops by way of other robots' maps, too.
+  /// From now on detect() also finds loops through other robots' maps.
   void use(std::shared_ptr<const OtherMapsInbox> others);
   /// Pose of an image that the tracker cannot place, camera_from_world, according to other robots' maps.
   std::optional<geometry::Rigid3> locate(const sensor::RgbdFrame& frame,
@@ -125,7 +125,7 @@ class LoopCloser {
   /// Solves a pose graph with these edges and the loops of the map; edges that it does not reject become the
   /// map's loops. If one of the new edges is among them, the map is moved, duplicates around these edges are
   /// merged, and everything is adjusted. Returns whether the map was moved. Edges may come from elsewhere
-  /// too. Nothing that was taken from the map before may be under way.
+  /// too. No work on data that was taken from the map before may be running.
   bool close(maps::Map& map, const std::vector<PoseEdge>& edges);
 
   /// Drops loops that wait for others to agree with them: they were measured with another camera.
@@ -144,7 +144,7 @@ class LoopCloser {
   [[nodiscard]] const std::vector<LoopTrial>& trials() const { return trials_; }
   /// Evidence against the tracked path, in the order in which enough loops agreed.
   [[nodiscard]] const std::vector<LoopDispute>& disputes() const { return disputes_; }
-  /// The path gave way to the newest dispute.
+  /// Removes the newest dispute, because the path was corrected for it.
   void remove_dispute() { disputes_.pop_back(); }
   [[nodiscard]] const places::Database& database() const { return database_; }
 

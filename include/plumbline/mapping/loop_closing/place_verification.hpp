@@ -23,7 +23,7 @@ struct VerificationOptions {
   int min_cells = 5;           ///< smallest number of cells with inliers, of a 4 x 4 grid
   double min_overlap = 0.5;    ///< smallest share of the surface in view that is confirmed
   double max_contradiction = 0.05;  ///< largest share of it in the free space of the other camera
-  int rounds = 600;                 ///< of RANSAC, at most
+  int rounds = 600;                 ///< largest number of RANSAC iterations
   int neighbours = 8;               ///< number of keyframes around the match whose landmarks are searched
   double orb_scale_factor = 1.2;
   bool depth_rows = true;  ///< the depth of points constrains the pose, too
@@ -42,10 +42,10 @@ struct PlaceView {
 /// Result of all steps; values of steps that were not reached are 0.
 struct PlaceVerification {
   bool accepted = false;
-  std::string refused;                ///< reason for a refusal, for people; empty if accepted
-  geometry::Rigid3 query_from_match;  ///< between the two cameras
+  std::string refused;                ///< reason for a refusal, as shown to users; empty if accepted
+  geometry::Rigid3 query_from_match;  ///< relative pose of the two cameras
   geometry::Matrix6d information = geometry::Matrix6d::Zero();  ///< of log(estimate * query_from_match^-1)
-  int matched_points = 0;                                       ///< by descriptor
+  int matched_points = 0;                                       ///< points matched by descriptor
   int matched_lines = 0;
   int ransac_inliers = 0;  ///< points and lines
   int points = 0;          ///< inliers in the end, from the whole surroundings
@@ -54,8 +54,8 @@ struct PlaceVerification {
   int visible_lines = 0;
   double found = 0.0;    ///< share of the visible landmarks that were found
   int cells = 0;         ///< number of cells with inliers, of 4 x 4
-  double rms_px = 0.0;   ///< of the points, in standard deviations (1 px at octave 0)
-  double overlap = 0.0;  ///< of the surfaces, both ways
+  double rms_px = 0.0;   ///< RMS residual of the points, in standard deviations (1 px at octave 0)
+  double overlap = 0.0;  ///< overlap of the surfaces, both ways
   double contradiction = 0.0;
   double surface_shift_m = 0.0;  ///< motion of the pose by the alignment of the surfaces; if accepted
   double surface_rms = 0.0;      ///< standard deviations

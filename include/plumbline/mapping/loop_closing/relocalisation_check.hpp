@@ -33,7 +33,7 @@ struct RelocalisationCheck {
   std::uint64_t seed = 0;
   tracking::SurfaceSamplerOptions surface;
 
-  /// `keyframe`: near which the camera was found; `found_at`: its camera_from_world.
+  /// True if the camera passes. `keyframe`: near which it was found; `found_at`: its camera_from_world.
   [[nodiscard]] bool passes(const maps::Map& map, const LostAt& lost, const sensor::RgbdFrame& frame,
                             const features::FrameFeatures& features, core::KeyframeId keyframe,
                             const geometry::Rigid3& found_at) const;

@@ -29,21 +29,21 @@ namespace plumbline::mapping {
 struct MapFusionOptions {
   int min_pairs = 5;  ///< keyframes of each map that must agree
   /// Exception for short overlaps: `few_pairs` keyframes suffice if they share `few_inliers` points and lines
-  /// (lines count twice), if surfaces hold in all directions or both maps extend over `few_extent_m` in a
-  /// free one, and if nothing supports another alignment.
+  /// (lines count twice), if surfaces constrain all directions or both maps extend over `few_extent_m` in
+  /// a free one, and if nothing supports another alignment.
   int few_pairs = 2;
   int few_inliers = 100;
   double few_extent_m = 3.0;
   double min_span_m = 0.25;   ///< smallest distance between agreeing keyframes; or
   double min_span_rad = 0.5;  ///< smallest rotation between them
   ConsistencyOptions consistency;
-  /// Keyframes of a second answer, relative to those of the best one, from which it is a doubt.
+  /// Smallest ratio of the keyframes of another alignment to those of the best one that makes it ambiguous.
   double alternative = 0.1;
-  /// Matching landmarks of another answer, relative to the best one's, from which it is a doubt.
+  /// The same ratio for matching landmarks.
   double alternative_share = 0.06;
-  double max_seen_through = 0.06;  ///< share of landmarks seen through above which such an answer is refuted
+  double max_seen_through = 0.06;  ///< share of landmarks seen through above which it is refuted
   double min_confirmed = 0.5;    ///< share of the keyframes with a view of the other map that must confirm it
-  int verifications = 250;       ///< pairs of keyframes that are verified for each two maps, at most
+  int verifications = 250;       ///< largest number of keyframe pairs that are verified for each two maps
   bool robust = true;            ///< the pose graph may reject pairs
   bool merge_duplicates = true;  ///< merge duplicate landmarks; a preview does not
   std::uint64_t seed = 1;
@@ -54,7 +54,7 @@ struct MapFusionOptions {
   GlobalAdjustmentOptions adjustment;
   MapFusionOptions();
   void declare(core::OptionTable& table);
-  /// Only what decides whether maps are merged.
+  /// Declares only the options that decide whether maps are merged.
   void declare_decision(core::OptionTable& table, const std::string& prefix = "");
 };
 
@@ -62,7 +62,7 @@ struct MapFusionOptions {
 /// functions it is passed to.
 struct MapPart {
   const maps::Map* map = nullptr;
-  Cameras cameras;  ///< of its robots
+  Cameras cameras;  ///< cameras of its robots
 };
 
 /// Two keyframes of different parts that show the same place.
@@ -72,10 +72,10 @@ struct VerifiedPair {
   PlaceVerification evidence;
 };
 
-/// One map laid over another: landmarks of either one, at their place in the other.
+/// Fit of two aligned maps: the landmarks of either one, tested in the other.
 struct OverlayFit {
   int expected = 0;  ///< landmarks where the other map measured a surface, from a similar side and distance
-  int matched = 0;   ///< of these, landmarks that the other map has too
+  int matched = 0;   ///< expected landmarks that the other map has too
   int contradicted = 0;  ///< landmarks where the other map saw through
   double chance = 0.0;   ///< expected matches with any other landmarks of that density
   /// Share of the expected landmarks that match, beyond chance.
@@ -84,8 +84,8 @@ struct OverlayFit {
   }
   /// Share of landmarks seen through, of those that can be judged.
   [[nodiscard]] double seen_through() const {
-    const int told = expected + contradicted;
-    return told > 0 ? static_cast<double>(contradicted) / told : 0.0;
+    const int judged = expected + contradicted;
+    return judged > 0 ? static_cast<double>(contradicted) / judged : 0.0;
   }
 };
 
@@ -95,7 +95,7 @@ struct Consistency {
   int agreeing = 0;                 ///< keyframes of the set, on the side that has fewer
   double span_m = 0.0;              ///< largest distance between b's keyframes of the set
   double span_rad = 0.0;            ///< largest rotation between them
-  std::vector<VerifiedPair> pairs;  ///< of the set
+  std::vector<VerifiedPair> pairs;  ///< pairs of the set
 };
 
 /// Relative pose of two worlds according to a set of pairs.
@@ -108,11 +108,11 @@ struct Alignment {
 
 /// Evidence on whether another alignment would fit as well.
 struct Ambiguity {
-  OverlayFit overlap;  ///< the maps, as aligned
+  OverlayFit overlap;  ///< fit of the maps as aligned
   /// Largest number of keyframes that support another alignment which the maps do not refute.
   int alternative = 0;
-  OverlayFit alternative_overlap;  ///< of the best other alignment that is not refuted
-  double alternative_m = 0.0;      ///< distance by which that one moves b's cameras; 0: there is none
+  OverlayFit alternative_overlap;  ///< fit of the best other alignment that is not refuted
+  double alternative_m = 0.0;      ///< distance by which that alignment moves b's cameras; 0: there is none
   /// Pieces of surface of one map that the other one has, and that it saw through; counted where few
   /// keyframes agree.
   int surfaces_there = 0;
@@ -122,32 +122,32 @@ struct Ambiguity {
 /// Check that other keyframes see what they should, if the alignment is right.
 struct CrossValidation {
   int expected = 0;                 ///< keyframes of b that should see what a saw
-  int confirmed = 0;                ///< of these, that do
-  std::vector<VerifiedPair> pairs;  ///< more that agree
+  int confirmed = 0;                ///< expected keyframes that do
+  std::vector<VerifiedPair> pairs;  ///< further pairs that agree
 };
 
 struct PairTotals {
-  int matches = 0;       ///< sums: by descriptor,
-  int inliers = 0;       ///< points and lines that fit in the end
-  double rms_px = 0.0;   ///< mean, standard deviations
-  double overlap = 0.0;  ///< of the surfaces, mean
+  int matches = 0;       ///< sum of matches by descriptor
+  int inliers = 0;       ///< sum of points and lines that fit in the end
+  double rms_px = 0.0;   ///< mean residual, standard deviations
+  double overlap = 0.0;  ///< mean overlap of the surfaces
 };
 
-/// All that was found out about two parts. What is refused at one step has no later ones.
+/// All evidence on two parts. Steps after the one that refused a merge are not run.
 struct MergeEvidence {
-  std::size_t a = 0;  ///< parts, a < b
+  std::size_t a = 0;  ///< index of the first part; a < b
   std::size_t b = 0;
   int candidates = 0;  ///< pairs of keyframes that look alike
-  int tried = 0;       ///< of these, verified or refused
+  int tried = 0;       ///< candidates that were verified or refused
   Consistency consistency;
   Alignment alignment;
   Ambiguity ambiguity;
   CrossValidation validation;
-  std::vector<VerifiedPair> pairs;           ///< all that agree
-  int rejected = 0;                          ///< of these, rejected by the pose graph of all maps
+  std::vector<VerifiedPair> pairs;           ///< all pairs that agree
+  int rejected = 0;                          ///< agreeing pairs rejected by the pose graph of all maps
   std::map<std::string, int> refused_pairs;  ///< number of refused pairs by reason
   bool accepted = false;
-  std::string refused;  ///< why not; empty when accepted
+  std::string refused;  ///< reason against the merge; empty if accepted
   [[nodiscard]] PairTotals totals() const;
 };
 
@@ -183,22 +183,23 @@ class OverlapFinder {
   places::Recogniser recogniser_;
 };
 
-/// One candidate, verified.
+/// Verifies one candidate.
 VerifiedPair verify_candidate(const std::vector<MapPart>& parts, const OverlapFinder::Candidate& candidate,
                               const MapFusionOptions& options);
 
 /// Decides whether these pairs, all between parts a and b, show that the maps overlap, and finds their
 /// relative pose. Fills all but candidates, tried and refused_pairs. If too few agree, keyframes near them
-/// are tested first; if enough agree, more views that should show both maps.
+/// are verified first; if enough agree, further views that should show both maps are verified.
 MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, std::size_t b,
                              const std::vector<VerifiedPair>& found, const MapFusionOptions& options,
                              const core::Executor& executor);
 
-/// A finder that knows all parts' keyframes, for look_at_all(): the first step of find_overlaps, and work of
+/// A finder to which all parts' keyframes were added, for look_at_all(): the first step of find_overlaps, on
 /// one thread.
 OverlapFinder learn_places(const std::vector<MapPart>& parts, const MapFusionOptions& options);
 
-/// All pairs of parts, by a, then b. The same for any number of threads. `look_alikes`: of look_at_all().
+/// Evidence on all pairs of parts, by a, then b. The same for any number of threads. `look_alikes`: result of
+/// look_at_all().
 std::vector<MergeEvidence> find_overlaps(const std::vector<MapPart>& parts,
                                          const std::vector<OverlapFinder::Candidate>& look_alikes,
                                          const MapFusionOptions& options, const core::Executor& executor);
@@ -209,14 +210,14 @@ std::vector<MergeEvidence> find_overlaps(const std::vector<MapPart>& parts, cons
 std::vector<std::size_t> connected_parts(std::size_t parts, const std::vector<MergeEvidence>& merges);
 
 struct FusedMap {
-  maps::Map map;  ///< of all parts of the anchor's group, in the anchor's world frame
+  maps::Map map;  ///< map of all parts of the anchor's group, in the anchor's world frame
   Cameras cameras;
-  std::vector<std::size_t> parts;                  ///< that are in it, ascending
-  std::vector<geometry::Rigid3> anchor_from_part;  ///< of these, before adjustment
-  int merged_points = 0;                           ///< duplicate landmarks
+  std::vector<std::size_t> parts;                  ///< parts in the map, ascending
+  std::vector<geometry::Rigid3> anchor_from_part;  ///< their poses before adjustment
+  int merged_points = 0;                           ///< duplicate landmarks removed
   int merged_lines = 0;
   int edges = 0;        ///< pairs of keyframes given to the pose graph
-  int rejected = 0;     ///< of these, rejected
+  int rejected = 0;     ///< pairs that the pose graph rejected
   int refused = 0;      ///< 1: the pose graph would have torn a map, and the parts lie at `anchor_from_part`
   std::string refusal;  ///< location of that tear
 };

@@ -27,19 +27,19 @@ enum class MeetingStep { kNone, kSimilar, kVerified, kLocalMapAsked, kMet, kTake
 
 struct MeetingEvent {
   MeetingStep step = MeetingStep::kNone;
-  std::size_t a = 0;  ///< robots, a < b
+  std::size_t a = 0;  ///< number of the first robot; a < b
   std::size_t b = 0;
-  std::int64_t frame = 0;                   ///< of the log, that brought the keyframe
-  core::KeyframeId keyframe;                ///< that made it happen
-  MergeEvidence evidence;                   ///< of kMet and kTakenBack
-  std::shared_ptr<const FusedMap> preview;  ///< of kMet: all maps that are connected now; parts: robots
+  std::int64_t frame = 0;                   ///< frame of the log with the keyframe
+  core::KeyframeId keyframe;                ///< keyframe that caused the step
+  MergeEvidence evidence;                   ///< evidence for kMet and kTakenBack
+  std::shared_ptr<const FusedMap> preview;  ///< for kMet: all maps connected now; its parts are robots
 };
 
 /// Pose of a robot in the frame that it shares with others.
 struct RobotPlace {
   std::size_t anchor = 0;              ///< robot whose world is the common frame: the first of those that met
-  geometry::Rigid3 anchor_from_robot;  ///< worlds
-  geometry::Rigid3 anchor_from_camera;  ///< of the newest keyframe
+  geometry::Rigid3 anchor_from_robot;  ///< relative pose of the worlds
+  geometry::Rigid3 anchor_from_camera;  ///< pose of the newest keyframe
   /// Covariance of that camera's position (metres) and rotation (radians), from the merges between it and the
   /// anchor, in the anchor's axes; drift of the robots' own maps is not in it.
   geometry::Matrix6d covariance = geometry::Matrix6d::Zero();
@@ -54,8 +54,8 @@ class MergeServer {
   /// Adds a robot; robots are numbered 0, 1, ..., in the ids of their maps too.
   std::size_t join(const Cameras& cameras);
 
-  /// A keyframe that is new in `map`, its robot's, at a frame of the log; frames never decrease. Throws
-  /// std::invalid_argument: no such robot or keyframe.
+  /// Adds a keyframe that is new in `map`, the map of its robot, at a frame of the log; frames never
+  /// decrease. Throws std::invalid_argument: no such robot or keyframe.
   void add(std::shared_ptr<const maps::Map> map, core::KeyframeId keyframe, std::int64_t frame);
   /// Events that are to be committed at this frame; mostly none. To be called for every frame, after add().
   std::vector<MeetingEvent> commit(std::int64_t frame);
@@ -71,22 +71,22 @@ class MergeServer {
     core::KeyframeId id;
     std::int64_t frame = 0;
   };
-  /// All that is known of two robots.
+  /// All evidence on two robots.
   struct RobotPair {
-    MeetingStep step = MeetingStep::kNone;  ///< the farthest that was reported
+    MeetingStep step = MeetingStep::kNone;  ///< latest step that was reported
     bool met = false;
     std::vector<VerifiedPair> verified;
-    std::size_t decided_pairs = 0;  ///< when it was decided last
-    std::size_t decided_keyframes = 0;
-    MergeEvidence evidence;  ///< when met, of the last decision
-    core::KeyframeId a;      ///< of the pair that carries its answer along while the maps move
+    std::size_t decided_pairs = 0;      ///< number of pairs at the last decision
+    std::size_t decided_keyframes = 0;  ///< number of keyframes at the last decision
+    MergeEvidence evidence;             ///< evidence of the last decision, if the robots have met
+    core::KeyframeId a;                 ///< keyframe of the pair that fixes the alignment while the maps move
     core::KeyframeId b;
-    geometry::Rigid3 a_from_b;  ///< their cameras
+    geometry::Rigid3 a_from_b;  ///< relative pose of the two cameras
   };
   /// Data of the background work while it runs.
   struct Work {
     std::vector<std::shared_ptr<const maps::Map>> maps;  ///< by robot, newest version
-    std::vector<MapPart> parts;                          ///< the same
+    std::vector<MapPart> parts;                          ///< the same maps as parts
     OverlapFinder finder;
     std::map<std::pair<std::size_t, std::size_t>, RobotPair> pairs;
     std::vector<MeetingEvent> events;
@@ -110,7 +110,7 @@ class MergeServer {
   int lag_;
   const core::Executor* executor_;
   Work work_;
-  std::vector<NewKeyframe> waiting_;  ///< for the work that is under way
+  std::vector<NewKeyframe> waiting_;  ///< keyframes that wait until the current work is done
   std::vector<std::optional<RobotPlace>> places_;
   bool busy_ = false;
   std::int64_t due_ = 0;

@@ -43,8 +43,8 @@ struct LocalMap {
   CoarseSurface surface;                  ///< anchor's camera frame
 };
 
-/// Cuts each robot's keyframes, by id, into local maps. Keyframes without a surface are passed over. Surfaces
-/// are fused side by side; the same for any number of threads.
+/// Cuts each robot's keyframes, by id, into local maps. Keyframes without a surface are skipped. Surfaces
+/// are fused in parallel; the same for any number of threads.
 std::vector<LocalMap> make_local_maps(const maps::Map& map,
                                       const std::map<core::KeyframeId, CoarseSurface>& surfaces,
                                       const LocalMapOptions& options, const core::Executor& executor);
@@ -58,8 +58,8 @@ struct AlignmentOptions {
   int max_iterations = 20;
   double min_cosine = 0.8;   ///< between the normals of matched samples
   double min_overlap = 0.3;  ///< share of the samples that must fit
-  double max_rms = 5.0;      ///< of these, in standard deviations
-  double max_shift_m = 0.3;  ///< alignments that move further are not believed
+  double max_rms = 5.0;      ///< largest RMS residual of these, in standard deviations
+  double max_shift_m = 0.3;  ///< alignments that move further are rejected
   double max_turn_rad = 0.2;
   double min_information = 0.02;  ///< share of the normals, squared, that a direction needs to count as held
   double correlation = 0.15;      ///< samples count by this much: noise of neighbours is alike
@@ -67,7 +67,7 @@ struct AlignmentOptions {
   void declare(core::OptionTable& table);
 };
 
-/// b_from_a as the two surfaces say.
+/// Relative pose b_from_a estimated from the two surfaces.
 struct SurfaceAlignment {
   geometry::Rigid3 b_from_a;
   geometry::Matrix6d information = geometry::Matrix6d::Zero();  ///< of log(estimate * b_from_a^-1)

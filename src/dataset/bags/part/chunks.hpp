@@ -15,10 +15,10 @@
 namespace plumbline::dataset {
 
 struct Chunk {
-  std::uint64_t plain_size = 0;  ///< of the records, not compressed
-  std::uint32_t crc = 0;         ///< of the records, not compressed; 0: none stored
+  std::uint64_t plain_size = 0;  ///< size of the uncompressed records
+  std::uint32_t crc = 0;         ///< checksum of the uncompressed records; 0: none stored
   Compression compression = Compression::kNone;
-  std::string unknown;  ///< the compression's name where it is none of these
+  std::string unknown;  ///< name of a compression that is not supported, else empty
   std::uint64_t data_at = 0;
   std::uint64_t data_size = 0;
 };
@@ -50,7 +50,8 @@ class ChunkCursor {
   std::uint64_t unpacked_ = 0;
 };
 
-/// The last chunks that were unpacked, by where they are: frames side by side are in one, or in neighbours.
+/// The last chunks that were unpacked, by position in the file: successive frames are in the same chunk or in
+/// adjacent ones.
 /// Thread-safe.
 class ChunkCache {
  public:

@@ -24,7 +24,7 @@ const std::array<KnownType, 6> kTypes = {{
 
 /// Configuration of the domain as XML. The environment is not read.
 std::string configuration(const NetworkOptions& options) {
-  // lo may lack multicast: there every port of this machine is asked.
+  // lo may lack multicast: every possible port of this machine is tried there.
   std::vector<std::string> peers = options.peers;
   if (options.interface == "lo" && peers.empty()) peers.emplace_back("127.0.0.1");
 
@@ -44,7 +44,7 @@ std::string configuration(const NetworkOptions& options) {
   }
   xml += fmt::format("<ExternalDomainId>{}</ExternalDomainId>", options.domain);
 
-  // Who starts later is found at once.
+  // Participants that start later are found at once.
   xml += "<SPDPInterval>1 s</SPDPInterval></Discovery>";
 
   // As much of a receive buffer as the system gives; no memory for samples larger than any cloud.
@@ -52,7 +52,7 @@ std::string configuration(const NetworkOptions& options) {
   return xml + "</Domain></CycloneDDS>";
 }
 
-/// Log lines of CycloneDDS are no affair of a user: a call that fails says so itself.
+/// Log lines of CycloneDDS are not shown to users: a call that fails returns an error.
 void discard(void* /*unused*/, const dds_log_data_t* /*data*/) {}
 
 }  // namespace

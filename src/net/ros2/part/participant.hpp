@@ -20,7 +20,7 @@ constexpr std::int32_t kSamplesKeptByWriter = 60;
 struct KnownType {
   const char* name;  ///< "sensor_msgs/Image"
   const dds_topic_descriptor_t* descriptor;
-  const char* hash;  ///< that Iron and later look for; "": there is a harmless warning without it
+  const char* hash;  ///< type hash that Iron and later look for; "": they print a harmless warning
 };
 
 /// Null: not known. `dds_name`: "sensor_msgs::msg::dds_::Image_".
@@ -29,13 +29,13 @@ const KnownType* known_type_of_dds(const std::string& dds_name);
 
 /// "sensor_msgs::msg::dds_::Image_" as "sensor_msgs/Image"; other names as they are.
 std::string ros_type(const std::string& dds_name);
-/// "rt/camera/image" as "/camera/image"; "" for what is no topic of ROS (services, parameters, others).
+/// "rt/camera/image" as "/camera/image"; "" if it is not a topic of ROS (services, parameters, others).
 std::string ros_topic(const std::string& dds_name);
 std::string dds_topic(const std::string& ros_name);
 
 using Qos = std::unique_ptr<dds_qos_t, decltype(&dds_delete_qos)>;
 Qos new_qos();
-/// Of a topic: the representation in which every middleware of ROS 2 reads and writes.
+/// Settings of a topic: the data representation that every middleware of ROS 2 supports.
 void pin_representation(Qos& qos);
 
 enum class Ros2Role { kListener, kSpeaker };  ///< a process has one of each in a domain

@@ -79,7 +79,7 @@ class Ros2Sink final : public dataset::MessageSink {
     const Writer& writer = writers_.at(topic);
     const Sample sample(*writer.type, bytes);
     const dds_return_t code = dds_write(writer.handle, sample.get());
-    // A listener that is too slow misses messages; that is its affair.
+    // A subscriber that is too slow misses messages, which is not an error.
     if (code == DDS_RETCODE_OK || code == DDS_RETCODE_TIMEOUT) return {};
     return core::failure(core::ErrorKind::kOutput,
                          fmt::format("{}: cannot be published ({})", topic, dds_strretcode(code)));

@@ -13,9 +13,9 @@
 namespace plumbline::net {
 namespace {
 
-/// A topic that somebody publishes.
+/// A topic with at least one publisher.
 struct Publication {
-  std::string type;  ///< of DDS
+  std::string type;  ///< name of the type in DDS
   bool reliable = true;
   bool latched = true;
 };
@@ -32,7 +32,7 @@ class Ros2Stream final : public dataset::MessageStream {
         dds_create_reader(participant_.handle(), DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr);
     waitset_ = dds_create_waitset(participant_.handle());
     if (publications_ > 0 && waitset_ > 0) return {};
-    return core::usage_error(fmt::format("ros2://{}: the network cannot be listened to ({})", options.domain,
+    return core::usage_error(fmt::format("ros2://{}: cannot receive from the network ({})", options.domain,
                                          dds_strretcode(std::min(publications_, waitset_))));
   }
 

@@ -6,7 +6,7 @@
 namespace plumbline::dataset {
 
 std::optional<Chunk> read_chunk_head(const BinaryFile& file, std::uint64_t at, std::uint64_t size) {
-  constexpr std::size_t kMostHead = 64;  // with a compression's name of up to 24 letters
+  constexpr std::size_t kMostHead = 64;  // fits the name of a compression of up to 24 letters
   std::array<std::uint8_t, kMostHead> head{};
   const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(size, kMostHead));
   if (!file.read(at, head.data(), count)) return std::nullopt;
@@ -28,7 +28,9 @@ std::optional<Chunk> read_chunk_head(const BinaryFile& file, std::uint64_t at, s
   } else if (!compression.empty() && compression != "none") {
     chunk.unknown = compression;
   }
-  if (chunk.compression == Compression::kNone && chunk.plain_size != chunk.data_size) return std::nullopt;
+
+  const bool stored_plain = chunk.compression == Compression::kNone && chunk.unknown.empty();
+  if (stored_plain && chunk.plain_size != chunk.data_size) return std::nullopt;
   return chunk;
 }
 

@@ -68,7 +68,7 @@ struct WrittenChunk {
   std::int64_t last_ns = 0;
   std::uint64_t at = 0;
   std::uint64_t record_size = 0;
-  std::map<std::uint16_t, std::uint64_t> index_at;  ///< of each channel's message index
+  std::map<std::uint16_t, std::uint64_t> index_at;  ///< position of each channel's message index
   std::uint64_t index_size = 0;
   std::uint64_t packed_size = 0;
   std::uint64_t plain_size = 0;
@@ -127,7 +127,7 @@ class McapWriter final : public BagWriter {
   Bytes definitions_;  ///< all schema and channel records, for the summary
   std::map<std::uint16_t, std::uint64_t> counts_;
 
-  Bytes records_;  ///< of the chunk that is being filled
+  Bytes records_;  ///< records of the chunk that is being filled
   std::map<std::uint16_t, std::vector<MessageSpot>> spots_;
   std::int64_t chunk_first_ns_ = 0;
   std::int64_t chunk_last_ns_ = 0;

@@ -154,10 +154,10 @@ core::Result<void> Ros1Bag::scan(const Visit& visit) {
       const bool good = scan_chunk(chunk, visit);
 
       if (!good && damaged_chunks_++ == 0) {
-        notes_.push_back(fmt::format("{}: the chunk at byte {} is damaged ({}); its other messages are lost",
-                                     shown_, begin,
-                                     chunk.unknown.empty() ? "cannot be unpacked or holds no records"
-                                                           : "unknown compression " + chunk.unknown));
+        notes_.push_back(fmt::format(
+            "{}: the chunk at byte {} is damaged ({}); its other messages are lost", shown_, begin,
+            chunk.unknown.empty() ? "cannot be unpacked or holds no records"
+                                  : "is compressed by '" + chunk.unknown + "' (known: none, bz2, lz4)"));
       }
     } else {
       // In a bag that was not closed the records of the last chunk are not enclosed in it.
