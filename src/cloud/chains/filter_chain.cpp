@@ -182,13 +182,10 @@ std::vector<std::string> FilterChain::types() const {
   return types;
 }
 
-core::Result<CloudPtr> FilterChain::apply(CloudConstPtr input, const FilterContext& context,
+core::Result<FusedCloud> FilterChain::run(CloudConstPtr input, CloudColumns columns, FilterContext context,
                                           std::vector<FilterReport>* reports,
                                           const ChainProgress& progress) const {
   if (auto fit = ready(context); !fit) return tl::unexpected<core::Error>(fit.error());
-  const bool columned = context.columns != nullptr && context.made_columns != nullptr;
-  CloudColumns columns = columned ? *context.columns : CloudColumns();
-  FilterContext mine = context;
   CloudConstPtr current = std::move(input);
   CloudPtr output;
 
@@ -199,10 +196,10 @@ core::Result<CloudPtr> FilterChain::apply(CloudConstPtr input, const FilterConte
     output.reset();  // `current` alone holds the input
 
     CloudColumns made;
-    mine.columns = &columns;
-    mine.made_columns = &made;
+    context.columns = &columns;
+    context.made_columns = &made;
     const auto start = std::chrono::steady_clock::now();
-    auto result = step.filter->apply(current, mine);
+    auto result = step.filter->apply(current, context);
     const std::chrono::duration<double, std::milli> elapsed = std::chrono::steady_clock::now() - start;
     if (!result) return tl::unexpected<core::Error>(at(i, result.error()));
 
@@ -215,10 +212,19 @@ core::Result<CloudPtr> FilterChain::apply(CloudConstPtr input, const FilterConte
   }
 
   if (progress) progress(filters_.size(), filters_.size(), "");
-  if (columned) *context.made_columns = std::move(columns);
-  if (output == nullptr) return std::make_shared<Cloud>(*current);  // an empty chain
+  if (output == nullptr) output = std::make_shared<Cloud>(*current);  // an empty chain
+  return FusedCloud{std::move(output), std::move(columns)};
+}
 
-  return output;
+core::Result<CloudPtr> FilterChain::apply(CloudConstPtr input, const FilterContext& context,
+                                          std::vector<FilterReport>* reports,
+                                          const ChainProgress& progress) const {
+  const bool columned = context.columns != nullptr && context.made_columns != nullptr;
+  auto filtered =
+      run(std::move(input), columned ? *context.columns : CloudColumns(), context, reports, progress);
+  if (!filtered) return tl::unexpected<core::Error>(filtered.error());
+  if (columned) *context.made_columns = std::move(filtered->columns);
+  return std::move(filtered->cloud);
 }
 
 std::string to_table(const std::vector<FilterReport>& reports) {
@@ -233,16 +239,10 @@ core::Result<FusedCloud> FilterChain::apply(FusedCloud fused, double spacing_m,
                                             const core::Executor& executor,
                                             std::vector<FilterReport>* reports) const {
   if (filters_.empty()) return fused;
-  FusedCloud result;
   FilterContext context;
   context.executor = &executor;
   context.spacing_m = spacing_m;
-  context.columns = &fused.columns;
-  context.made_columns = &result.columns;
-  auto filtered = apply(std::move(fused.cloud), context, reports);
-  if (!filtered) return tl::unexpected<core::Error>(filtered.error());
-  result.cloud = std::move(*filtered);
-  return result;
+  return run(std::move(fused.cloud), std::move(fused.columns), context, reports, {});
 }
 
 }  // namespace plumbline::cloud

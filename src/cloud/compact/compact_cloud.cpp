@@ -50,6 +50,7 @@ std::optional<Rays> rays_of(const Cloud& cloud, double step_m) {
     for (std::uint32_t column = 0; column < cloud.width; ++column, ++i) {
       const Point& p = cloud[i];
       if (!finite(p)) continue;
+
       if (!(p.z > 0.0F) || static_cast<double>(p.z) > 65534.0 * step_m) return std::nullopt;
       if (std::isnan(rays.x[column])) rays.x[column] = p.x / p.z;
       if (std::isnan(rays.y[row])) rays.y[row] = p.y / p.z;
@@ -106,6 +107,7 @@ void columns(Io& io, const std::vector<Point*>& points) {
       const auto normal = pack_direction({p.normal_x, p.normal_y, p.normal_z});
       const std::array<std::uint8_t, 5> now{p.g, static_cast<std::uint8_t>(p.r - p.g),
                                             static_cast<std::uint8_t>(p.b - p.g), normal[0], normal[1]};
+
       for (std::size_t k = 0; k < now.size(); ++k) {
         bytes[k * count + i] = static_cast<std::uint8_t>(now[k] - before[k]);
       }

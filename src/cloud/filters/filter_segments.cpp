@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <map>
 
 #include "filters/filter_tools.hpp"
@@ -228,23 +229,26 @@ class ClustersFilter : public Filter {
     grid.setDownsampleAllData(false);  // positions alone
     grid.setSaveLeafLayout(true);
     const auto means = std::make_shared<Cloud>();
-    std::vector<std::size_t> mean_of(points->size());
+    std::vector<std::uint32_t> mean_of(points->size());
 
     for (const auto& [place, indices] : blocks) {
       Cloud part;
       grid.setIndices(indices);
       grid.filter(part);
+
       for (const auto index : *indices) {
         const auto i = static_cast<std::size_t>(index);
-        mean_of[i] = means->size() + static_cast<std::size_t>(grid.getCentroidIndex((*points)[i]));
+        mean_of[i] = static_cast<std::uint32_t>(means->size()) +
+                     static_cast<std::uint32_t>(grid.getCentroidIndex((*points)[i]));
       }
       *means += part;
     }
 
     const std::vector<pcl::Indices> groups = clusters_of(means, distance_m, 1);
-    std::vector<std::size_t> group_of(means->size());
+    std::vector<std::uint32_t> group_of(means->size());
     for (std::size_t g = 0; g < groups.size(); ++g) {
-      for (const auto mean : groups[g]) group_of[static_cast<std::size_t>(mean)] = g;
+      for (const auto mean : groups[g])
+        group_of[static_cast<std::size_t>(mean)] = static_cast<std::uint32_t>(g);
     }
 
     std::vector<pcl::Indices> clusters(groups.size());

@@ -38,7 +38,7 @@ std::size_t cells_per_tile(const DenseFusionOptions& options) {
 
 /// Cells of the tiles that are filled together, in the voxel maps.
 std::size_t cells_at_a_time(const DenseFusionOptions& options) {
-  return cells_within(6.0 * options.tile_mb, 110.0, options);
+  return cells_within(3.0 * options.tile_mb, 110.0, options);
 }
 
 /// The first error in the order of the items, if any.
@@ -71,18 +71,7 @@ class Fusion {
       std::vector<VoxelMap> voxels(count, VoxelMap(options_.voxels));
       if (auto filled = fill(first, voxels); !filled) return tl::unexpected<core::Error>(filled.error());
 
-      std::vector<std::vector<FusedPoint>> parts(count);
-      std::vector<FusionReport> reports(count);
-      executor_.parallel_for(count, [&](std::size_t k) {
-        parts[k] = finished(tiles_[first + k], std::move(voxels[k]), reports[k]);
-      });
-
-      for (std::size_t k = 0; k < count; ++k) {
-        add(parts[k], all);
-        parts[k] = {};
-        report.isolated += reports[k].isolated;
-        report.seen_through += reports[k].seen_through;
-      }
+      finish(first, voxels, report, all);
     }
 
     return all;
@@ -178,6 +167,40 @@ class Fusion {
     const std::uint8_t robot = several_robots() ? views_.robots[v] : std::uint8_t{0};
     samples = VoxelMap::measured(**cloud, world_from_cloud_[v], options_.voxels, robot);
     return {};
+  }
+
+  /// Estimate for all tiles, from the first ones and with some reserve: it costs nothing until it is used,
+  /// while a growing list would be there twice.
+  [[nodiscard]] std::size_t expected_points(const std::vector<VoxelMap>& first_tiles) const {
+    constexpr double kReserve = 1.2;
+    std::size_t voxels = 0, cells = 0, all_cells = 0;
+    for (const VoxelMap& tile : first_tiles) voxels += tile.size();
+    for (std::size_t k = 0; k < tiles_.size(); ++k) {
+      if (k < first_tiles.size()) cells += tiles_[k].occupied;
+      all_cells += tiles_[k].occupied;
+    }
+    return static_cast<std::size_t>(kReserve * static_cast<double>(voxels) * static_cast<double>(all_cells) /
+                                    static_cast<double>(std::max<std::size_t>(1, cells)));
+  }
+
+  /// Appends the points of the tiles from `first` on, a few tiles at a time: their points are larger than the
+  /// voxels that they replace.
+  void finish(std::size_t first, std::vector<VoxelMap>& voxels, FusionReport& report, FusedCloud& all) const {
+    constexpr std::size_t kTilesAtATime = 4;
+    if (first == 0) all.cloud->points.reserve(expected_points(voxels));
+    for (std::size_t begin = 0; begin < voxels.size(); begin += kTilesAtATime) {
+      std::vector<std::vector<FusedPoint>> parts(std::min(kTilesAtATime, voxels.size() - begin));
+      std::vector<FusionReport> reports(parts.size());
+      executor_.parallel_for(parts.size(), [&](std::size_t k) {
+        parts[k] = finished(tiles_[first + begin + k], std::move(voxels[begin + k]), reports[k]);
+      });
+
+      for (std::size_t k = 0; k < parts.size(); ++k) {
+        add(parts[k], all);
+        report.isolated += reports[k].isolated;
+        report.seen_through += reports[k].seen_through;
+      }
+    }
   }
 
   /// The points of a tile.
@@ -291,7 +314,7 @@ void DenseFusionOptions::declare(core::OptionTable& table) {
   table.integer("min_support", min_support, {0, 1000}, "",
                 "Remove points with fewer neighbours of similar normal than this; 0: keep all");
   table.number("tile_mb", tile_mb, {16.0, 100000.0}, "",
-               "Memory per tile, MB; tiles that take up to six times this in total are filled at a time");
+               "Memory per tile, MB; tiles that take up to three times this in total are filled at a time");
 }
 
 core::Result<FusedCloud> fuse_views(const FusionViews& views, const DenseFusionOptions& options,

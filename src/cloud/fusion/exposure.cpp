@@ -23,28 +23,44 @@ constexpr int kBright = 245;
 /// Mean colour of one view in a cell.
 struct CellColor {
   std::uint64_t cell = 0;
-  std::size_t view = 0;
+  std::uint32_t view = 0;
   Eigen::Array3f log_color;
   Eigen::Array3f weight = Eigen::Array3f::Ones();
 };
 
-/// Cell by cell, those that two views or more saw in colour.
+/// Number of cells that `view` saw in colour.
+std::size_t count_colored(const std::vector<ColorCell>& view) {
+  return static_cast<std::size_t>(
+      std::count_if(view.begin(), view.end(), [](const auto& cell) { return cell.points >= kFewestPoints; }));
+}
+
+/// Cell by cell, those that two views or more saw in colour. There are thousands for each view, so the list
+/// is allocated once, and sorted and thinned in place.
 std::vector<CellColor> shared_colors(const std::vector<std::vector<ColorCell>>& views) {
+  std::size_t count = 0;
+  for (const auto& view : views) count += count_colored(view);
   std::vector<CellColor> all;
+  all.reserve(count);
+
   for (std::size_t v = 0; v < views.size(); ++v) {
     for (const ColorCell& cell : views[v]) {
-      if (cell.points >= kFewestPoints) all.push_back({cell.cell, v, cell.color.array().log(), {1, 1, 1}});
+      if (cell.points < kFewestPoints) continue;
+      all.push_back({cell.cell, static_cast<std::uint32_t>(v), cell.color.array().log(), {1, 1, 1}});
     }
   }
-  std::stable_sort(all.begin(), all.end(),
-                   [](const CellColor& a, const CellColor& b) { return a.cell < b.cell; });
-  std::vector<CellColor> shared;
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    const bool as_before = i > 0 && all[i - 1].cell == all[i].cell;
-    const bool as_after = i + 1 < all.size() && all[i + 1].cell == all[i].cell;
-    if (as_before || as_after) shared.push_back(all[i]);
+
+  std::sort(all.begin(), all.end(), [](const CellColor& a, const CellColor& b) {
+    return a.cell != b.cell ? a.cell < b.cell : a.view < b.view;
+  });
+
+  auto kept = all.begin();
+  for (auto first = all.begin(), end = first; first != all.end(); first = end) {
+    end = std::find_if(first, all.end(), [&](const CellColor& c) { return c.cell != first->cell; });
+    if (end - first > 1) kept = std::move(first, end, kept);
   }
-  return shared;
+
+  all.erase(kept, all.end());
+  return all;
 }
 
 Eigen::Array3f robust_weight(const Eigen::Array3f& residual) {

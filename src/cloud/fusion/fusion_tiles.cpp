@@ -53,7 +53,10 @@ void cut(const Cells::iterator& begin, const Cells::iterator& end, const Eigen::
 }  // namespace
 
 std::vector<FusionTile> plan_tiles(const std::vector<std::vector<ColorCell>>& views, std::size_t most_cells) {
+  std::size_t count = 0;
+  for (const auto& view : views) count += view.size();
   std::vector<std::uint64_t> keys;
+  keys.reserve(count);
   for (const auto& view : views) {
     for (const ColorCell& cell : view) keys.push_back(cell.cell);
   }

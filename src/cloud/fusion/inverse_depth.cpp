@@ -137,6 +137,7 @@ void widen_means(Grid& grid, int step, float noise, float wanted_m) {
         const float middle = from[i];
         const float sigma = noise * inverse_depth_sigma(middle);
         const float pair = from[i - stride] + from[i + stride];
+
         const bool noisy = sigma > wanted_m * middle * middle;
         const bool straight = std::abs(pair - 2.0F * middle) < kStraight * sigma;
         to[i] = noisy && straight ? (pair + middle) * (1.0F / 3.0F) : middle;

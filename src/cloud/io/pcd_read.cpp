@@ -221,6 +221,7 @@ class PcdWords {
 std::string read_ascii(ByteReader& reader, const PcdHeader& header, CloudBuilder& builder) {
   PcdWords words(reader, header.elements);
   std::string word;
+
   for (std::uint64_t row = 0; row < header.points; ++row) {
     for (std::size_t f = 0; f < header.fields.size(); ++f) {
       const PcdField& field = header.fields[f];

@@ -213,7 +213,8 @@ core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const
 
   if (static_cast<std::size_t>(options.walkers) > scene.walkers.size()) {
     return core::usage_error(
-        fmt::format("walkers: scene '{}' has {}, not {}", scene.name, scene.walkers.size(), options.walkers));
+        fmt::format("walkers: scene '{}' has {}, not {}; ask for fewer, or add some to a copy of the scene",
+                    scene.name, scene.walkers.size(), options.walkers));
   }
 
   // Cheap checks come before the second or two of drawing.

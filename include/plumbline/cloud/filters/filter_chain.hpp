@@ -71,6 +71,8 @@ class FilterChain {
 
  private:
   [[nodiscard]] core::Error at(std::size_t step, const core::Error& error) const;
+  core::Result<FusedCloud> run(CloudConstPtr input, CloudColumns columns, FilterContext context,
+                               std::vector<FilterReport>* reports, const ChainProgress& progress) const;
 
   struct Step {
     std::string type;

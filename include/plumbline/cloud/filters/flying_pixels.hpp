@@ -73,11 +73,13 @@ class FlyingPixels : public ChoosingFilter<PointT> {
     const std::size_t width = cloud.width;
     Marks marks{std::vector<std::uint8_t>(cloud.size()), std::vector<std::uint8_t>(cloud.size())};
     const auto tangent = static_cast<float>(std::tan(max_angle_rad_));
+
     const auto pair = [&](std::size_t a, std::size_t b, const View& view) {
       if (!pcl::isXYZFinite(cloud[b])) return;
       const Eigen::Vector3f difference = cloud[b].getVector3fMap() - cloud[a].getVector3fMap();
       const float along = difference.dot(view.ray);
       const float across = std::sqrt(std::max(0.0F, difference.squaredNorm() - along * along));
+
       if (std::abs(along) > view.noise + tangent * across) {
         marks.jump[a] = marks.jump[b] = 1;
       } else {
@@ -85,16 +87,19 @@ class FlyingPixels : public ChoosingFilter<PointT> {
         ++marks.neighbours[b];
       }
     };
+
     for (std::size_t i = 0; i < cloud.size(); ++i) {
       if (!pcl::isXYZFinite(cloud[i])) continue;
       const View view = view_of(cloud[i].getVector3fMap() - viewpoint);
       const std::size_t column = i % width;
       const bool below = i + width < cloud.size();
+
       if (column + 1 < width) pair(i, i + 1, view);
       if (below) pair(i, i + width, view);
       if (below && column + 1 < width) pair(i, i + width + 1, view);
       if (below && column > 0) pair(i, i + width - 1, view);
     }
+
     return marks;
   }
 

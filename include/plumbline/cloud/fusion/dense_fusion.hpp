@@ -28,7 +28,7 @@ struct DenseFusionOptions {
   bool free_space = true;        ///< remove points that other views look through
   bool exposure = true;          ///< colours are evened out between views
   int min_support = 6;     ///< points with fewer like them within about 3 blocks are isolated; 0: none is
-  double tile_mb = 100.0;  ///< memory that one tile may take; tiles of six times that are filled together
+  double tile_mb = 100.0;  ///< memory that one tile may take; tiles of three times that are filled together
 
   void declare(core::OptionTable& table);
 };
