@@ -27,8 +27,8 @@ void refuse_unknown_keys(const ConfigNode& map, const std::string& path,
   for (std::size_t i = 0; i < map.entries.size(); ++i) {
     const std::string& key = map.entries[i].first;
     if (std::find(known.begin(), known.end(), key) != known.end()) continue;
-    problems.push_back(
-        {map.key_marks[i], path.empty() ? key : path + "." + key, "unknown key" + core::hint(key, known)});
+    problems.push_back({map.key_marks[i], path.empty() ? key : fmt::format("{}.{}", path, key),
+                        "unknown key" + core::hint(key, known)});
   }
 }
 
@@ -204,7 +204,8 @@ core::Result<FusedCloud> FilterChain::run(CloudConstPtr input, CloudColumns colu
     if (!result) return tl::unexpected<core::Error>(at(i, result.error()));
 
     output = std::move(*result);
-    columns = made.empty() ? carry_columns(*current, columns, *output) : std::move(made);
+    if (made.empty()) made = carry_columns(*current, columns, *output);
+    std::swap(columns, made);
     current = output;
     const std::size_t left = count_finite(*current);
     if (reports != nullptr) reports->push_back({step.type, points, left, elapsed.count()});

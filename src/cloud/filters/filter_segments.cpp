@@ -203,6 +203,7 @@ class ClustersFilter : public Filter {
     std::vector<pcl::PointIndices> found;
     extraction.extract(found);
     std::vector<pcl::Indices> clusters;
+    clusters.reserve(found.size());
     for (pcl::PointIndices& cluster : found) clusters.push_back(std::move(cluster.indices));
     return clusters;
   }

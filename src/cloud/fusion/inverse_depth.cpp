@@ -69,10 +69,10 @@ Grid smooth_along_rows(const cv::Mat& depth, int stride, int half, float min_dep
   const int pad = half / stride + 1;
   Grid smoothed{cells, depth.rows,
                 std::vector<float>(static_cast<std::size_t>(cells) * static_cast<std::size_t>(depth.rows))};
-  std::vector<float> inverse(static_cast<std::size_t>(cells * stride), 0.0F);
+  std::vector<float> inverse(static_cast<std::size_t>(cells) * static_cast<std::size_t>(stride), 0.0F);
 
   // phases[k] holds pixels k, k + stride, ... so that neighbours of neighbouring cells lie side by side.
-  const auto padded = static_cast<std::size_t>(cells + 2 * pad);
+  const std::size_t padded = static_cast<std::size_t>(cells) + 2 * static_cast<std::size_t>(pad);
   std::vector<std::vector<float>> phases(static_cast<std::size_t>(stride), std::vector<float>(padded, 0.0F));
 
   Pass pass(cells);
@@ -80,7 +80,8 @@ Grid smooth_along_rows(const cv::Mat& depth, int stride, int half, float min_dep
     invert(depth.ptr<float>(v), depth.cols, min_depth, max_depth, inverse.data());
     for (int k = 0; k < stride; ++k) {
       float* phase = phases[static_cast<std::size_t>(k)].data() + pad;
-      for (int i = 0; i < cells; ++i) phase[i] = inverse[static_cast<std::size_t>(i * stride + k)];
+      auto at = static_cast<std::size_t>(k);
+      for (int i = 0; i < cells; ++i, at += static_cast<std::size_t>(stride)) phase[i] = inverse[at];
     }
 
     const float* reference = phases[0].data() + pad;

@@ -93,7 +93,7 @@ std::string parse_per_field(const std::string& key, std::istringstream& words, P
     if (key == "TYPE") {
       field.type = word.size() == 1 ? word[0] : '?';
     } else if (!number) {
-      return key + ": '" + word + "' is not a number";
+      return fmt::format("{}: '{}' is not a number", key, word);
     } else {
       (key == "SIZE" ? field.size : field.count) = *number;
     }
