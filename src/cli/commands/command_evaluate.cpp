@@ -93,6 +93,7 @@ std::vector<evaluate::ComponentReport> measure_components(const fs::path& result
   for (const fs::path& folder : folders) {
     const auto way = dataset::read_trajectory(folder / "trajectory.txt");
     if (!way) continue;
+
     evaluate::ComponentReport component;
     component.name = folder.filename().string();
     component.poses = way->size();

@@ -225,6 +225,7 @@ std::string read_ascii(ByteReader& reader, const PcdHeader& header, CloudBuilder
   for (std::uint64_t row = 0; row < header.points; ++row) {
     for (std::size_t f = 0; f < header.fields.size(); ++f) {
       const PcdField& field = header.fields[f];
+
       for (std::uint64_t k = 0; k < field.count; ++k) {
         if (!words.next(word)) return truncated(row, header.points);
         if (words.decimal_comma())

@@ -36,7 +36,8 @@ class Body {
     double count = 0.0;
     if (!scalar(property.count_type, count)) return false;
     if (!(count >= 0.0) || count != std::floor(count)) return refuse("list length is not a natural number");
-    if (count > kLongestList) return refuse("list with more than 65536 items");
+    if (count > kLongestList)
+      return refuse("list with more than 65536 items; the file is damaged or no mesh: export it again");
     items_.resize(static_cast<std::size_t>(count));
     for (double& item : items_) {
       if (!scalar(property.type, item)) return false;

@@ -99,6 +99,7 @@ class Player {
     start_ = Clock::now();
     const double first = source_.info(0).stamp;
     const double last = source_.info(source_.size() - 1).stamp;
+
     for (std::size_t round = 0; !options_.stop.stop_requested() && (round == 0 || options_.loop); ++round) {
       offset_s_ = static_cast<double>(round) * (last - first + step_s_);
       if (auto played = play_once(first); !played) return tl::unexpected(played.error());

@@ -36,6 +36,7 @@ std::vector<std::size_t> one_of_each_cell(const cloud::CloudFile& file, double c
       return std::tie(cell, doubt, index) < std::tie(other.cell, other.doubt, other.index);
     }
   };
+
   const std::vector<float>& confidence = file.columns.confidence;
   std::vector<Candidate> candidates;
   candidates.reserve(file.cloud->size());

@@ -42,6 +42,7 @@ class LiveMeetings {
   /// `track`: null for a frame without a pose.
   core::Result<void> add(const TrackedFrame* track, std::size_t frame) {
     const auto number = static_cast<std::int64_t>(frame);
+
     if (track != nullptr && track->map != nullptr) {
       made_s_[track->keyframe] = recordings_.time_of(frame);
       server_.add(track->map, track->keyframe, number);

@@ -141,6 +141,7 @@ core::Result<void> Ros1Bag::scan(const Visit& visit) {
 
   std::uint64_t begin = at;
   bool whole = true;
+
   while (whole && (begin = at) < file_.size()) {
     const auto record = next_record(get);
     whole = record && record->data_size <= file_.size() - at;
