@@ -213,11 +213,16 @@ class Mapping(Folder):
 
     def test_interrupt_writes_what_there_is(self):
         long = "synth:room?frames=3000&width=320&height=240"
-        threading.Timer(3.0, os.kill, (os.getpid(), signal.SIGINT)).start()
-        begin = time.monotonic()
+
+        def interrupt():
+            while not any(self.work.glob("interrupted*/map.db")):
+                time.sleep(0.05)
+            time.sleep(2.0)
+            os.kill(os.getpid(), signal.SIGINT)
+
+        threading.Thread(target=interrupt, daemon=True).start()
         with self.assertRaises(KeyboardInterrupt):
             plumbline.map(long, self.work / "interrupted")
-        self.assertLess(time.monotonic() - begin, 120.0)
         result = plumbline.load(self.work / "interrupted")
         self.assertLess(result.summary["frames"]["read"], 3000)
         self.assertGreater(len(result.trajectory), 0)

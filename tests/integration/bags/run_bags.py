@@ -10,6 +10,7 @@ them, or Debian's python3-rosbag, python3-opencv, lz4 and zstd, the test is skip
 """
 import os
 import random
+import resource
 import shutil
 import subprocess
 import sys
@@ -174,8 +175,13 @@ def cut(test):
             print(f"{bag.name} cut at {share}: {[l for l in done.stdout.splitlines() if l.startswith('pairs')]}", flush=True)
 
 
+def processor_time():
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 def mutations(test, count=1000, budget_s=400):
-    """Any byte of small bags changed, taken out or doubled; 2 GB of memory, 10 s."""
+    """Any byte of small bags changed, taken out or doubled; 2 GB of memory, 10 s of a processor."""
     rng = random.Random(1)
     corpus = sorted((HERE.parents[1] / "fuzz/corpus/bag").iterdir())
     begin, done, codes = time.monotonic(), 0, {}
@@ -195,10 +201,10 @@ def mutations(test, count=1000, budget_s=400):
                 data[place:place + 8] = rng.choice([b"\xff" * 8, b"\x00" * 8, b"\xff\xff\xff\x7f" * 2])
         bag = test.work / ("mutated" + source.suffix)
         bag.write_bytes(data)
-        started = time.monotonic()
+        before = processor_time()
         outcome = test.run("info", bag, limit_kb=2_000_000, timeout=60)
         codes[outcome.returncode] = codes.get(outcome.returncode, 0) + 1
-        slow = time.monotonic() - started > 10 and time.monotonic() - begin < budget_s
+        slow = processor_time() - before > 10
         if outcome.returncode not in DOCUMENTED or slow:
             kept = test.work / f"finding_{done}{source.suffix}"
             shutil.copy(bag, kept)

@@ -133,7 +133,7 @@ TEST_F(Fuse, RobotsSideBySideMeetWhileTheyMap) {
   ASSERT_EQ(summary["merges"].size(), 1U);
   EXPECT_TRUE(summary["merges"][0]["accepted"]);
   EXPECT_GT(summary["merges"][0]["time_s"], 0.0);
-  EXPECT_LT(summary["merges"][0]["time_s"], 3.0);
+  EXPECT_LT(summary["merges"][0]["time_s"], summary["timing"]["wall_s"]);
   EXPECT_GT(summary["merges"][0]["evident_s"], 0.0);
   ASSERT_EQ(summary["meetings"].size(), 1U);
   EXPECT_FALSE(summary["meetings"][0]["taken_back"]);
