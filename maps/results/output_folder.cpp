@@ -72,9 +72,16 @@ tl::unexpected<core::Error> another_run(const fs::path& partial) {
       fmt::format("{}: another run is writing there; wait or name another output folder", partial.string()));
 }
 
-/// Removes the remains of an interrupted run, and nothing else; with `takes_over` only checks that they are
-/// such.
-core::Result<void> clear_leftover(const fs::path& partial, bool takes_over) {
+/// True if an interrupted run has left a map, or a hub those of robots.
+bool holds_map(const fs::path& partial) {
+  std::error_code ec;
+  const fs::path robots = partial / "robots";
+  return fs::exists(partial / "map.db", ec) || (fs::is_directory(robots, ec) && !fs::is_empty(robots, ec));
+}
+
+/// Removes the remains of an interrupted run, and nothing else; its map only with `replace`. With
+/// `takes_over` only checks that they are such.
+core::Result<void> clear_leftover(const fs::path& partial, bool replace, bool takes_over) {
   std::error_code ec;
   if (!fs::exists(partial, ec)) return {};
   if (!fs::is_empty(partial, ec) && !fs::exists(partial / kMarker, ec)) {
@@ -85,6 +92,13 @@ core::Result<void> clear_leftover(const fs::path& partial, bool takes_over) {
   if (takes_over) return {};
   const int lock = lock_marker(partial, O_RDONLY);
   if (lock < 0 && !fs::is_empty(partial, ec)) return another_run(partial);
+  if (!replace && holds_map(partial)) {
+    if (lock >= 0) close(lock);
+    return core::usage_error(
+        fmt::format("{}: holds the map of an interrupted run; --resume continues it, --force drops it",
+                    partial.string()));
+  }
+
   fs::remove_all(partial, ec);
   if (lock >= 0) close(lock);
   if (ec)
@@ -127,7 +141,8 @@ core::Result<OutputFolder> OutputFolder::prepare(const fs::path& out, bool repla
     return tl::unexpected(checked.error());
 
   const fs::path partial = with_ending(target, ".partial");
-  if (auto cleared = clear_leftover(partial, takes_over); !cleared) return tl::unexpected(cleared.error());
+  if (auto cleared = clear_leftover(partial, replace, takes_over); !cleared)
+    return tl::unexpected(cleared.error());
 
   std::error_code ec;
   fs::create_directories(partial, ec);

@@ -217,6 +217,7 @@ core::Result<void> MapFollower::apply(const StoreTransaction& transaction) {
     Bytes rows = transaction.rows;
     consume_rows(rows, [&](const StoreRow& row, std::size_t) {
       const char* table = kRowTables[row.name.table].name;
+      if (std::string(table) == "attachment") return;
       const MapRows::Key key{row.name.robot, row.name.number};
       if (row.removed) return map_->rows.remove(table, key);
       map_->rows.put(key, check_row(row.name, row.data, map_->robots));

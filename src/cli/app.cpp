@@ -5,13 +5,19 @@
 #include <pcl/console/print.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
 #include <exception>
+#include <iostream>
 #include <map>
 #include <opencv2/core/utility.hpp>
+#include <system_error>
 #include <utility>
 
 #include "paths.hpp"
 #include "plumbline/cloud/filters/filter_plugin.hpp"
+#include "terminal/help.hpp"
 #include "terminal/signals.hpp"
 #include "terminal/version_text.hpp"
 
@@ -21,6 +27,45 @@ namespace {
 const char* const kFooter =
     "Exit codes: 0 done, 1 a bug, 2 usage or configuration, 3 input data, 4 done but not trustworthy,\n"
     "5 output cannot be written. More about a command: plumbline COMMAND --help";
+
+/// The exit code `code`, unless standard output cannot be written, of which `cause` is the errno if it is
+/// known: it is buffered, and what is lost may show only at the end. A reader that closes its pipe wants no
+/// more.
+int check_standard_output(Session& session, int code, int cause = 0) {
+  errno = 0;
+  std::cout.flush();
+  std::fflush(stdout);
+  if (cause == 0) cause = errno;
+  if (std::ferror(stdout) == 0 || cause == EPIPE) return code;
+  session.console().error(fmt::format("standard output: cannot be written{}",
+                                      cause == 0 ? "" : fmt::format(" ({})", std::strerror(cause))));
+  return static_cast<int>(core::ErrorKind::kOutput);
+}
+
+/// The exit code of the command that was named.
+int run_command(Session& session) {
+  ignore_write_signals();
+  cv::setNumThreads(1);                                     // threads come from the executor alone
+  pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // the step that called PCL reports failures
+
+  std::string what;
+  try {
+    return check_standard_output(session, session.command());
+  } catch (const std::bad_alloc&) {
+    session.console().error("not enough memory");
+    return static_cast<int>(core::ErrorKind::kInternal);
+  } catch (const std::system_error& e) {
+    if (std::ferror(stdout) != 0)  // thrown by fmt::print
+      return check_standard_output(session, static_cast<int>(core::ErrorKind::kOutput), e.code().value());
+    what = e.what();
+  } catch (const std::exception& e) {
+    what = e.what();
+  }
+
+  session.console().error(
+      fmt::format("internal error: {}; please report it with the command you gave", what));
+  return static_cast<int>(core::ErrorKind::kInternal);
+}
 
 }  // namespace
 
@@ -115,7 +160,7 @@ void add_progress_option(CLI::App& command, Session& session) {
           "Progress on stderr: json writes one object per line, for programs; messages are not affected "
           "(default: auto, one line that is rewritten on a terminal, else lines)")
       ->type_name("auto|json|none")
-      ->transform(CLI::CheckedTransformer(styles));
+      ->transform(one_of(styles));
 }
 
 void add_pipeline_options(CLI::App& command, Session& session, pipeline::RunRequest& request) {
@@ -186,6 +231,7 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", version_text());
   app.require_subcommand(1);
   app.footer(kFooter);
+  app.formatter(std::make_shared<PlainHelp>());
 
   Session session;
   for (const auto add : {add_map, add_fuse, add_hub, add_robot, add_keys, add_calibrate, add_convert,
@@ -197,23 +243,15 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : static_cast<int>(core::ErrorKind::kUsage);
+    if (e.get_exit_code() == 0) {  // --help, --version
+      errno = 0;
+      app.exit(e);
+      return check_standard_output(session, 0, errno);
+    }
+    return session.fail({core::ErrorKind::kUsage, usage_problem(app, e)});
   }
 
-  ignore_write_signals();
-  cv::setNumThreads(1);                                     // threads come from the executor alone
-  pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // the step that called PCL reports failures
-
-  try {
-    return session.command();
-  } catch (const std::bad_alloc&) {
-    session.console().error("not enough memory");
-  } catch (const std::exception& e) {
-    session.console().error(
-        fmt::format("internal error: {}; please report it with the command you gave", e.what()));
-  }
-
-  return static_cast<int>(core::ErrorKind::kInternal);
+  return run_command(session);
 }
 
 }  // namespace plumbline::cli

@@ -2,9 +2,12 @@
 #pragma once
 
 // The command line: one function per command, each in command_<name>.cpp.
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -77,6 +80,21 @@ core::Result<void> prepare_publisher(Session& session, const std::string& addres
                                      const std::string& name, pipeline::RunRequest& request);
 /// Called after the command line is parsed: sets the function that opens addresses, and the stop token.
 void prepare_live(pipeline::MapRequest& request);
+/// Takes these words alone, each for a value of an enumeration: CLI11's own check shows the numbers behind
+/// them.
+template <typename Enum>
+CLI::Validator one_of(const std::map<std::string, Enum>& words) {
+  return CLI::Validator(
+      [words](std::string& text) -> std::string {
+        std::string allowed;
+        for (const auto& [word, value] : words) allowed += (allowed.empty() ? "" : ", ") + word;
+        const auto found = words.find(text);
+        if (found == words.end()) return fmt::format("'{}' (allowed: {})", text, allowed);
+        text = std::to_string(static_cast<int>(found->second));
+        return {};
+      },
+      "");
+}
 /// --topic, for commands that read recordings, which may be bags.
 void add_topic_option(CLI::App& command, dataset::OpenOptions& open);
 /// A word that only groups commands, like `evaluate`.

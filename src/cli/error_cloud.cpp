@@ -60,6 +60,7 @@ cloud::PlyData as_ply(const evaluate::SurfaceSamples& cloud, const std::vector<f
   ply.add("green", std::move(rgb[1]));
   ply.add("blue", std::move(rgb[2]));
   ply.add("error", error_m);
+  ply.shift = {cloud.shift.x(), cloud.shift.y(), cloud.shift.z()};
   ply.comments = {"error: distance in metres",
                   fmt::format("colours: 0 (dark blue) to {:g} mm and more (yellow)", 1000.0 * end_m)};
   return ply;

@@ -14,7 +14,25 @@ namespace {
 
 constexpr std::size_t kBuffer = std::size_t{1} << 20;
 
-std::string reason() { return std::strerror(errno); }
+/// Advice for a user whose file the system refused to write.
+const char* remedy(int cause) {
+  switch (cause) {
+    case ENOENT:
+      return "make the folder first";
+    case EACCES:
+    case EPERM:
+    case EROFS:
+      return "choose a folder that you may write to";
+    case EISDIR:
+      return "name a file";
+    case ENOSPC:
+    case EDQUOT:
+    case EFBIG:
+      return "free space or choose another disk";
+    default:
+      return "choose another folder";
+  }
+}
 
 }  // namespace
 
@@ -27,7 +45,7 @@ OutputFile::OutputFile(std::filesystem::path target) : target_(std::move(target)
   }
 
   if (std::filesystem::is_directory(real, error)) {
-    fail("is a folder");
+    problem_ = target_.string() + ": is a folder; " + remedy(EISDIR);
     return;
   }
 
@@ -42,7 +60,7 @@ OutputFile::OutputFile(std::filesystem::path target) : target_(std::move(target)
   }
 
   if (descriptor_ < 0) {
-    fail("cannot be opened for writing (" + reason() + ")");
+    fail("cannot be opened for writing", errno);
     return;
   }
 
@@ -71,14 +89,15 @@ void OutputFile::flush() {
     if (n >= 0) {
       done += static_cast<std::size_t>(n);
     } else if (errno != EINTR) {
-      fail("cannot be written (" + reason() + ")");
+      fail("cannot be written", errno);
     }
   }
   buffer_.clear();
 }
 
-void OutputFile::fail(const std::string& what) {
-  if (problem_.empty()) problem_ = target_.string() + ": " + what;
+void OutputFile::fail(const std::string& what, int cause) {
+  if (!problem_.empty()) return;
+  problem_ = target_.string() + ": " + what + " (" + std::strerror(cause) + "); " + remedy(cause);
 }
 
 void OutputFile::discard() {
@@ -95,22 +114,31 @@ Result<void> OutputFile::commit() {
     descriptor_ = -1;
     // A full disk may show only here (delayed allocation on network folders).
     if (::close(descriptor) != 0) {
-      fail("cannot be written (" + reason() + ")");
+      fail("cannot be written", errno);
       if (written_ != target_) ::unlink(written_.c_str());
     } else if (written_ != target_ && ::rename(written_.c_str(), target_.c_str()) != 0) {
-      fail("cannot be replaced (" + reason() + ")");
+      fail("cannot be replaced", errno);
       ::unlink(written_.c_str());
     }
   }
   discard();
-  if (problem_.empty()) return {};
-  return output_error(problem_ + "; free space or choose another folder");
+  return problem_.empty() ? Result<void>() : output_error(problem_);
+}
+
+Result<void> check_writable(const std::filesystem::path& file) {
+  std::error_code ec;
+  if (std::filesystem::exists(file, ec) && !std::filesystem::is_regular_file(file, ec) &&
+      !std::filesystem::is_directory(file, ec))
+    return {};  // opening and closing a pipe would end it for its reader
+  OutputFile out(file);
+  return out.good() ? Result<void>() : out.commit();
 }
 
 Result<void> make_folder(const std::filesystem::path& folder) {
   std::error_code ec;
   std::filesystem::create_directories(folder, ec);
-  return ec ? output_error(folder.string() + ": cannot be created (" + ec.message() + ")") : Result<void>();
+  if (!ec) return {};
+  return output_error(folder.string() + ": cannot be created (" + ec.message() + "); " + remedy(ec.value()));
 }
 
 Result<void> write_file(const std::filesystem::path& file, std::string_view bytes) {

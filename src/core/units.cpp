@@ -70,6 +70,9 @@ ParsedNumber parse_number(const ConfigNode& node, const std::string& unit) {
   while (!text.empty() && text.front() == ' ') text.remove_prefix(1);
   if (text.empty() || text == unit) return parsed;
 
+  if (text.size() > 1 && text[0] == ',' && text[1] >= '0' && text[1] <= '9')
+    return wrong(describe(node) + ": decimal comma; write numbers with a point");
+
   const Unit* from = find_unit(text);
   const Unit* to = find_unit(unit);
   if (from == nullptr || to == nullptr || from->quantity != to->quantity) {

@@ -117,6 +117,12 @@ core::Result<void> select(const OpenOptions& options, const std::string& folder,
     if (inside++ % static_cast<std::size_t>(options.every) == 0) kept.push_back(std::move(pair));
   }
 
+  if (kept.empty() && options.to_s == OpenOptions().to_s) {
+    return core::usage_error(
+        fmt::format("{}: nothing lies after {} s (--from); the recording ends at {:.2f} s", folder,
+                    options.from_s, duration));
+  }
+
   if (kept.empty()) {
     return core::usage_error(
         fmt::format("{}: nothing lies between {} s and {} s (--from, --to): the recording is {:.2f} s long",
@@ -125,6 +131,12 @@ core::Result<void> select(const OpenOptions& options, const std::string& folder,
 
   pairs = std::move(kept);
   return {};
+}
+
+/// True for the folder of a result, also of an interrupted run, and for its map.db.
+bool is_result(const fs::path& path) {
+  return path.filename() == "map.db" || is_file(path / "map.db") ||
+         (is_file(path / "summary.json") && is_file(path / "config.yaml"));
 }
 
 /// Name of a recording: a folder's name, or a bag's without its extensions.
@@ -188,6 +200,11 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
   }
 
   auto layout = read_any(folder, options, layout_options, log);
+  if (!layout && is_result(folder)) {
+    return core::input_error(fmt::format(
+        "{}: is a result of plumbline map, not a recording; give the recording that it was made of",
+        folder.string()));
+  }
   if (!layout) return tl::unexpected(layout.error());
   round_stamps(layout->pairs);
   drop_same_stamps(folder.string(), layout->pairs, log);
@@ -195,6 +212,8 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
 
   auto camera = complete_camera(folder, *chosen, *layout, log);
   if (!camera) return tl::unexpected(camera.error());
+  if (auto likely = check_focal_lengths(*camera, folder.string()); !likely)
+    return tl::unexpected(likely.error());
   layout->color_reduction = stored_reduction(*layout, *camera);
   layout->gives_odometry = layout->truth_is_odometry && options.poses == PoseUse::kPrior;
   if (auto kinds = check_image_kinds(*layout, *camera, log); !kinds) return tl::unexpected(kinds.error());

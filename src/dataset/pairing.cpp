@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <system_error>
 #include <tuple>
 
 #include "layout.hpp"
@@ -78,14 +79,22 @@ std::string no_common_time(const std::string& color_name, const std::vector<Stam
 core::Result<void> check_files(const std::string& list, const std::vector<StampedFile>& files,
                                core::Log& log) {
   std::size_t missing = 0;
+  bool denied = false;
   const StampedFile* first = nullptr;
   for (const StampedFile& file : files) {
-    std::error_code ignored;
-    if (std::filesystem::exists(file.file, ignored)) continue;
-    if (missing++ == 0) first = &file;
+    std::error_code why;
+    if (std::filesystem::exists(file.file, why)) continue;
+    if (missing++ > 0) continue;
+    first = &file;
+    denied = why == std::errc::permission_denied;
   }
 
   if (missing == 0) return {};
+  if (missing == files.size() && denied) {
+    return core::input_error(
+        fmt::format("{}:{}: names {}, which cannot be reached: no permission for its folder", list,
+                    first->line, first->file));
+  }
   if (missing == files.size()) {
     return core::input_error(
         fmt::format("{}:{}: names {}, which does not exist, and none of its {} files does; copy the image "

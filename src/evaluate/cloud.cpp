@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "icp.hpp"
+#include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/evaluate/trajectory.hpp"
 #include "plumbline/geometry/alignment.hpp"
 #include "prepare.hpp"
@@ -36,6 +37,7 @@ struct Truth {
   std::unique_ptr<MeasuredSurface> surface;
   SurfaceSamples counted;  ///< samples at which completeness is measured
   std::size_t hidden = 0;
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();  ///< of all of them
 };
 
 SurfaceSamples visible_of(SurfaceSamples samples, std::size_t& hidden) {
@@ -54,6 +56,7 @@ SurfaceSamples visible_of(SurfaceSamples samples, std::size_t& hidden) {
 core::Result<Truth> make_truth(const Reference& reference, const CloudOptions& options,
                                const core::Executor& executor, CloudReport& report) {
   Truth truth;
+  truth.shift = reference.shift;
   if (!reference.mesh.triangles.empty()) {
     truth.surface = std::make_unique<MeshSurface>(reference.mesh);
     const double coarsest = std::sqrt(surface_area(reference.mesh) / static_cast<double>(kMostMeshSamples));
@@ -90,8 +93,11 @@ core::Result<Truth> make_truth(const Reference& reference, const CloudOptions& o
   return truth;
 }
 
-/// Least squares over the matched positions of all robots together.
-core::Result<Rigid3> start_from_trajectories(const std::vector<TrajectoryPair>& pairs, CloudReport& report) {
+/// Least squares over the matched positions of all robots together, each side less its shift; without
+/// trajectories the cloud stays where it is.
+core::Result<Rigid3> start_from_trajectories(const std::vector<TrajectoryPair>& pairs,
+                                             const Eigen::Vector3d& shift, const Eigen::Vector3d& true_shift,
+                                             CloudReport& report) {
   std::vector<Eigen::Vector3d> source;
   std::vector<Eigen::Vector3d> target;
 
@@ -101,12 +107,12 @@ core::Result<Rigid3> start_from_trajectories(const std::vector<TrajectoryPair>& 
     const auto matched = evaluate_trajectory(pair.estimate, pair.truth, options);
     if (!matched) return tl::unexpected(matched.error());
     for (const PoseError& pose : matched->poses) {
-      source.push_back(pose.estimate.translation);
-      target.push_back(pose.truth.translation);
+      source.push_back(pose.estimate.translation - shift);
+      target.push_back(pose.truth.translation - true_shift);
     }
   }
 
-  if (source.empty()) return Rigid3{};
+  if (source.empty()) return Rigid3(Eigen::Matrix3d::Identity(), shift - true_shift);
   if (source.size() < 3) {
     return core::input_error(fmt::format(
         "only {} poses match the truth in time; 3 are needed to start the alignment", source.size()));
@@ -120,23 +126,30 @@ core::Result<Rigid3> start_from_trajectories(const std::vector<TrajectoryPair>& 
   return start;
 }
 
-core::Result<void> align(SurfaceSamples& cloud, const MeasuredSurface& surface, const CloudOptions& options,
+core::Result<void> align(SurfaceSamples& cloud, const Truth& truth, const CloudOptions& options,
                          const std::vector<TrajectoryPair>& trajectories, const core::Executor& executor,
                          CloudReport& report) {
   report.alignment.align = options.align;
-  if (options.align == CloudAlignment::kNone) return {};
-  const auto start = start_from_trajectories(trajectories, report);
+  const bool none = options.align == CloudAlignment::kNone;
+  const auto start = start_from_trajectories(none ? std::vector<TrajectoryPair>{} : trajectories, cloud.shift,
+                                             truth.shift, report);
   if (!start) return tl::unexpected(start.error());
+  if (none) {
+    if (cloud.shift != truth.shift) move(*start, cloud);
+    report.alignment.reference_from_cloud = *start;
+    return {};
+  }
 
-  const IcpResult icp =
-      align_icp(cloud.points, surface, *start, {options.icp_max_distance_m, options.icp_trim}, executor);
+  const IcpResult icp = align_icp(cloud.points, *truth.surface, *start,
+                                  {options.icp_max_distance_m, options.icp_trim}, executor);
   report.alignment.reference_from_cloud = icp.reference_from_cloud;
   report.alignment.icp_iterations = icp.iterations;
   report.alignment.icp_rmse_mm = 1000.0 * icp.rmse_m;
   report.alignment.icp_overlap = icp.overlap;
   report.alignment.icp_converged = icp.converged;
 
-  if (icp.overlap < 0.3) {
+  report.alignment.failed = icp.overlap < 0.3;
+  if (report.alignment.failed) {
     report.warnings.push_back(fmt::format(
         "alignment: only {:.0f} % of the cloud found a partner within reach; the numbers are not to be "
         "trusted{}",
@@ -258,6 +271,13 @@ void warn_when_apart(const CloudOptions& options, CloudReport& report) {
             "--truth GT"));
 }
 
+/// Planes and alignment in the coordinates of the files, which were less a shift till now.
+void add_shifts(const Eigen::Vector3d& shift, const Eigen::Vector3d& true_shift, CloudReport& report) {
+  for (WallPlane& plane : report.planes) plane.offset_m += plane.normal.dot(shift);
+  Rigid3& moved = report.alignment.reference_from_cloud;
+  moved.translation += true_shift - moved.rotation * shift;
+}
+
 }  // namespace
 
 void CloudOptions::declare(core::OptionTable& table) {
@@ -285,6 +305,11 @@ core::Result<CloudReport> evaluate_cloud(const SurfaceSamples& cloud, const Refe
   if (const auto ok = check(options); !ok) return tl::unexpected(ok.error());
   if (reference != nullptr) {
     if (const auto ok = check(*reference); !ok) return tl::unexpected(ok.error());
+    const bool placed = options.align != CloudAlignment::kNone && !trajectories.empty();
+    const auto fits =
+        placed ? core::Result<void>()
+               : cloud::check_one_frame("the cloud", cloud.shift, reference->name, reference->shift);
+    if (!fits) return tl::unexpected(fits.error());
   }
   CloudReport report;
   auto prepared = prepare(cloud, executor, report);
@@ -306,19 +331,21 @@ core::Result<CloudReport> evaluate_cloud(const SurfaceSamples& cloud, const Refe
     report.warnings.push_back("no flat patch was found that is dense enough: wall thickness is not known");
   }
 
-  if (!truth) return report;
+  if (!truth) {
+    add_shifts(cloud.shift, cloud.shift, report);
+    return report;
+  }
 
   report.has_reference = true;
   report.error_m.assign(cloud.points.size(), kNone);
-  if (const auto ok = align(*prepared->samples, *truth->surface, options, trajectories, executor, report);
-      !ok) {
+  if (const auto ok = align(*prepared->samples, *truth, options, trajectories, executor, report); !ok)
     return tl::unexpected(ok.error());
-  }
 
-  if (options.align != CloudAlignment::kNone)
+  if (options.align != CloudAlignment::kNone || cloud.shift != truth->shift)
     prepared->index = std::make_unique<PointIndex>(prepared->samples->points);
   compare(*prepared, *truth, options, executor, report);
   warn_when_apart(options, report);
+  add_shifts(cloud.shift, truth->shift, report);
   return report;
 }
 

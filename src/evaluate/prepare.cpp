@@ -89,6 +89,7 @@ core::Result<PreparedCloud> prepare(const SurfaceSamples& cloud, const core::Exe
 
   PreparedCloud out;
   out.samples = std::make_unique<SurfaceSamples>();
+  out.samples->shift = cloud.shift;
   for (std::size_t i = 0; i < cloud.points.size(); ++i) {
     if (!cloud.points[i].allFinite()) continue;
     out.samples->points.push_back(cloud.points[i]);

@@ -110,9 +110,14 @@ std::string too_few_message(std::size_t matched, std::size_t needed, const Traje
     return fmt::format("estimate and truth do not overlap in time ({}): are they of the same recording?",
                        ranges);
   }
+  if (estimate.size() < needed || truth.size() < needed) {
+    return fmt::format("too few poses: the estimate has {}, the truth {}, and {} are needed{}",
+                       estimate.size(), truth.size(), needed,
+                       needed > 1 ? "; --align start or none takes one" : "");
+  }
   return fmt::format(
       "only {} of {} poses have truth within {} s of their stamp, {} are needed ({}): is the truth complete, "
-      "or max_dt too small?",
+      "or --max-dt too small?",
       matched, estimate.size(), max_dt_s, needed, ranges);
 }
 

@@ -8,6 +8,8 @@
 
 #include "formats.hpp"
 #include "plumbline/core/config.hpp"
+#include "plumbline/maps/output_check.hpp"
+#include "source/georeference.hpp"
 
 namespace plumbline::exports {
 namespace {
@@ -60,12 +62,12 @@ core::Result<Choice> chosen_by_name(const ExportRequest& request) {
     return core::usage_error(
         fmt::format("--format {}: cannot hold the map's {}", format.name, content_name(request.content)));
   }
-  return core::usage_error(fmt::format("--format {}: there is no such format (allowed: {}){}", request.format,
-                                       fmt::join(names, ", "), core::hint(request.format, names)));
+  return core::usage_error(fmt::format("--format {}: there is no such format{}", request.format,
+                                       core::hint(request.format, names)));
 }
 
 core::Result<Choice> chosen_by_ending(const ExportRequest& request) {
-  const std::string name = request.output.filename().string();
+  const std::string name = lower(request.output.filename().string());
   Choice best;
   std::size_t longest = 0;
   std::vector<std::string> endings;
@@ -86,8 +88,17 @@ core::Result<Choice> chosen_by_ending(const ExportRequest& request) {
     best = {&format, fits ? request.content : format.contents.front()};
   }
 
-  const bool text_of_a_path = best.content != request.content && request.output.extension() == ".txt";
+  const bool text_of_a_path =
+      best.content != request.content && lower(request.output.extension().string()) == ".txt";
   if (best.format != nullptr && !text_of_a_path) return best;
+  const bool path = request.content == Content::kTrajectory || request.content == Content::kKeyframes;
+  if (folder && path) {
+    return core::usage_error(
+        fmt::format("{}: has no ending; for a folder with the path of each robot name the format too: "
+                    "--format kitti -o {}",
+                    request.output.string(), request.output.string()));
+  }
+
   std::sort(endings.begin(), endings.end());
   endings.erase(std::unique(endings.begin(), endings.end()), endings.end());
   return core::usage_error(fmt::format(
@@ -140,12 +151,18 @@ core::Result<ExportSummary> write_export(const ExportRequest& given, const core:
   const auto choice = chosen(given);
   if (!choice) return tl::unexpected(choice.error());
   if (auto fits = check_options(given, *choice); !fits) return tl::unexpected(fits.error());
+  std::vector<std::filesystem::path> inputs(given.recordings.begin(), given.recordings.end());
+  inputs.push_back(given.input);
+  if (auto free = maps::check_output(given.output, inputs); !free) return tl::unexpected(free.error());
+
   ExportRequest request = given;
   request.content = choice->content;
   auto source = MapSource::open(request, executor, log, progress);
   if (!source) return tl::unexpected(source.error());
   auto summary = choice->format->write(*source, request.output);
-  if (summary) summary->format = choice->format->name;
+  if (!summary) return summary;
+  if (request.options.datum.empty() && request.options.epsg == 0) remove_georeference(request.output);
+  summary->format = choice->format->name;
   return summary;
 }
 

@@ -130,7 +130,7 @@ std::string exports_page() {
   page += fmt::format(
       "## Options\n\n{} work with every format, the others with those that list them below. In "
       "`exports:` of the stage `output` they are written as here, on the command line as `--dense-points "
-      "1000`.\n\n{}",
+      "1000` or `--ascii on`: switches take `on` or `off`.\n\n{}",
       flags_text(common_options()), options_text());
 
   for (const FormatInfo& format : infos) {

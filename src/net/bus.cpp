@@ -29,7 +29,7 @@ core::Result<void> warn_of_security(const NetworkOptions& options, const std::st
       .map([&](int days) {
         const std::string keys = options.security.string();
         if (days < 0) {
-          log.warning(fmt::format("the keys in {} have expired; make new ones: plumbline keys", keys));
+          log.warning(fmt::format("the keys in {} have expired; make new ones: plumbline keys create", keys));
         } else if (days < kSoon) {
           log.warning(fmt::format("the keys in {} expire in {} days", keys, days));
         }

@@ -124,6 +124,8 @@ class Mapping(Folder):
         config = (result.folder / "config.yaml").read_text()
         self.assertRegex(config, r"voxel: 0\.04 m")
         self.assertRegex(config, r"loops: (off|false)")
+        with self.assertRaisesRegex(plumbline.InputError, "frames that were fed"):
+            result.image(0)
         with self.assertRaisesRegex(plumbline.ConfigError, "did you mean"):
             mapper = plumbline.Mapper("tum_fr1", fuse={"voxle": 1})
             mapper.finish()
@@ -147,6 +149,8 @@ class Mapping(Folder):
         for arguments, message in cases:
             with self.subTest(message), self.assertRaisesRegex(plumbline.InputError, message):
                 mapper.feed(*arguments)
+        with self.assertRaisesRegex(TypeError, r"feed\(color, depth, stamp\) .* not float, ndarray, ndarray"):
+            mapper.feed(1.0, f.color, f.depth)
         with self.assertRaisesRegex(plumbline.InputError, "odometry: the matrix is no rigid motion"):
             mapper.feed(f.color, f.depth, 1.0, odometry=np.ones((4, 4)))
         mapper.feed(f.color, f.depth, 1.0)
@@ -345,6 +349,10 @@ class Results(Folder):
         self.assertEqual(same["ate_m"], printed["ate_m"])
         cloud = plumbline.evaluate_cloud(self.result, wall_patch="30 cm")
         self.assertIn("wall_thickness_mm", cloud)
+        (self.work / "utm.xyz").write_text("701362.56 4485513.72 100\n701362.57 4485513.72 100\n")
+        far = plumbline.evaluate_cloud(plumbline.Cloud.read(self.work / "utm.xyz"), self.work / "utm.xyz")
+        self.assertAlmostEqual(far["density"]["spacing_mm"], 10.0, places=3)
+        self.assertEqual(far["accuracy_mm"]["max"], 0.0)
         with self.assertRaisesRegex(plumbline.ConfigError, "aline"):
             plumbline.evaluate_trajectory(self.result, self.recording, aline="se3")
 
@@ -371,6 +379,8 @@ class Results(Folder):
         self.assertEqual(set(both.keyframes.robots), set(both.robots))
         self.assertLessEqual(set(both.landmarks.robot), set(both.robots))
         self.assertGreaterEqual(both.keyframes.frames.min(), 0)
+        with self.assertRaisesRegex(plumbline.InputError, "no robot 'typo'; give one of them: "):
+            both.image(0, robot="typo")
         self.assertTrue(both.trustworthy, both.reason)
 
     def test_no_result_is_an_input_error(self):

@@ -52,6 +52,8 @@ core::Result<ReportSummary> write_report(const ReportRequest& request, const cor
   if (auto free = check_output(file, request.replace); !free)
     return tl::unexpected<core::Error>(free.error());
 
+  if (!data->kind.empty()) log.info(fmt::format("{}: its {}", request.result.string(), data->kind));
+
   if (!request.truth.empty()) {
     if (auto added = add_truth(request.truth, *data); !added)
       return tl::unexpected<core::Error>(added.error());

@@ -25,6 +25,7 @@ core::Result<Json> read_summary(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
   Json json = Json::parse(stream, nullptr, false);
   if (json.is_object() && json.contains("frames") && json.contains("trustworthy")) return json;
+  if (!stream.is_open()) return core::input_error(fmt::format("{}: {}", file.string(), fault_of(file)));
   return core::input_error(fmt::format("{}: is damaged or not of plumbline map; map again", file.string()));
 }
 
@@ -80,7 +81,7 @@ void add_store(ReportData& data) {
 
   const auto stored = maps::StoredRun::open_main(file);
   if (!stored) {
-    data.missing.emplace_back("map.db is damaged: loops are not drawn");
+    data.missing.push_back(fmt::format("map.db {}: loops are not drawn", fault_of(file)));
     return;
   }
 
@@ -105,6 +106,21 @@ bool fused_afterwards(const fs::path& folder) {
   return run != nullptr && run->find("maps") != nullptr;
 }
 
+/// Nature of the result of a pipeline without a stage `output`, such as that of `robot`; "" for all others.
+std::string kind_of(const ReportData& data) {
+  const auto config = core::read_yaml(data.folder / "config.yaml");
+  const core::ConfigNode* stages = config ? config->find("stages") : nullptr;
+  if (stages == nullptr) return "";
+  for (const auto& [name, stage] : stages->entries) {
+    const core::ConfigNode* type = stage.find("type");
+    if (type != nullptr && type->scalar == "output") return "";
+  }
+  return fmt::format(
+      "pipeline {} has no stage output: all is in map.db, for fuse, export and render, and the report has "
+      "neither paths nor a cloud",
+      text_at(data.summary, "/pipeline"));
+}
+
 void add_cloud(ReportData& data) {
   std::error_code ec;
   const maps::ResultFolder result{data.folder};
@@ -118,7 +134,8 @@ void add_cloud(ReportData& data) {
     data.cloud = std::move(*cloud);
     data.extent = measure_extent(*data.cloud->cloud);
   } else {
-    data.missing.push_back(data.cloud_file + " is damaged: its extent and plan are not shown");
+    const std::string fault = fault_of(data.folder / data.cloud_file);
+    data.missing.push_back(fmt::format("{} {}: its extent and plan are not shown", data.cloud_file, fault));
   }
 }
 
@@ -182,8 +199,10 @@ core::Result<ReportData> read_report_data(const fs::path& folder) {
   add_paths(data);
   data.fused_afterwards = fused_afterwards(folder);
   add_frames(data);
+  data.kind = kind_of(data);
+  if (!data.kind.empty()) data.missing.clear();
   add_store(data);
-  add_cloud(data);
+  if (data.kind.empty()) add_cloud(data);
   return data;
 }
 

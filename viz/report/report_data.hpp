@@ -62,6 +62,7 @@ struct ReportData {
   std::string name;
   nlohmann::ordered_json summary;
   bool fused_afterwards = false;  ///< by plumbline fuse: of maps, not of recordings
+  std::string kind;               ///< what the result is, if files of most results are not part of it
   bool z_up = true;               ///< of the frame of the results; else y is down
   double start_s = 0.0;           ///< stamp of the run's first frame
   double end_s = 0.0;             ///< of the last one

@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <fstream>
 #include <limits>
 #include <sstream>
@@ -68,6 +70,12 @@ std::string read_bytes(const std::filesystem::path& file) {
   std::ostringstream bytes;
   bytes << stream.rdbuf();
   return bytes.str();
+}
+
+std::string fault_of(const std::filesystem::path& file) {
+  errno = 0;
+  const std::ifstream stream(file, std::ios::binary);
+  return stream.is_open() ? "is damaged" : fmt::format("cannot be read ({})", std::strerror(errno));
 }
 
 }  // namespace plumbline::report

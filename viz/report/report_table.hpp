@@ -38,4 +38,7 @@ class CsvTable {
 /// A whole file; empty when it cannot be read.
 std::string read_bytes(const std::filesystem::path& file);
 
+/// "is damaged" of a file that was read in vain; "cannot be read (Permission denied)" if it cannot be opened.
+std::string fault_of(const std::filesystem::path& file);
+
 }  // namespace plumbline::report

@@ -19,7 +19,6 @@ class View {
     this.blend = 'a';
     this.sets = {};
     this.budget = 250000;
-    this.leastBudget = 20000;
     this.dirty = true;
     this.listeners = [];
     this.first = 0;
@@ -268,7 +267,7 @@ class View {
       this.fence = null;
       this.took = now - this.sent;
       const factor = this.took > 85 ? 0.7 : this.took < 45 ? 1.2 : 1;
-      this.budget = clamp(this.budget * factor, this.leastBudget, 4e6);
+      this.budget = clamp(this.budget * factor, 20000, 4e6);
     }
     if (!this.dirty && !this.refining) return;
     const still = now - (this.moved || 0) > 180;

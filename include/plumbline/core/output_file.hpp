@@ -30,13 +30,15 @@ class OutputFile {
     write(&value, sizeof(value));
   }
 
+  /// False if something went wrong already: commit() tells what.
+  [[nodiscard]] bool good() const { return problem_.empty(); }
   /// Flushes, closes, renames. The first thing that went wrong since opening, as a kOutput error naming the
-  /// target.
+  /// target, the cause and what to do about it.
   Result<void> commit();
 
  private:
   void flush();
-  void fail(const std::string& what);
+  void fail(const std::string& what, int cause);
   void discard();
 
   std::filesystem::path target_;
@@ -45,6 +47,9 @@ class OutputFile {
   std::vector<char> buffer_;
   std::string problem_;
 };
+
+/// Checks that a file could be written there, and leaves nothing behind. Errors (kOutput).
+Result<void> check_writable(const std::filesystem::path& file);
 
 /// Makes the folder and all folders above it; existing ones are fine. Errors (kOutput).
 Result<void> make_folder(const std::filesystem::path& folder);

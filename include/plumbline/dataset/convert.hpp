@@ -29,7 +29,8 @@ struct ConvertSummary {
 /// whole camera file in a metadata record), else a TUM folder (images as they are stored, float depth as
 /// float TIFF, camera.yaml, groundtruth.txt if there is truth). Mapping the copy gives the bytes of the
 /// original. Memory does not grow with the recording; `out` appears when all is written. Errors: kUsage
-/// (`out` is there and no copy that may be replaced), kInput (no frame can be read), kOutput.
+/// (`out` is there and was not written by this function, or has an ending of files that are not
+/// written), kInput (no frame can be read), kOutput.
 core::Result<ConvertSummary> convert_recording(const FrameSource& source, const std::filesystem::path& out,
                                                const ConvertOptions& options, core::Log& log);
 

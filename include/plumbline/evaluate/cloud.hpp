@@ -69,6 +69,7 @@ struct CloudAlignmentReport {
   double icp_rmse_mm = 0.0;  ///< point to plane, of the pairs kept
   double icp_overlap = 0.0;  ///< share of cloud points with a partner in reach at the end
   bool icp_converged = false;
+  bool failed = false;  ///< so few partners that the numbers are not to be trusted
 };
 
 struct CloudReport {
@@ -98,8 +99,10 @@ struct CloudReport {
 };
 
 /// `reference` null: wall thickness and density only. `trajectories`: where alignment starts; may be empty.
-/// Same bytes for any number of threads. Errors (kInput): no finite point in the cloud, a reference without
-/// points, or with points that are not finite, or of which none was visible. kUsage: an option out of range.
+/// Trajectories, planes and alignment are in the coordinates of the files, `reference_samples` less the
+/// reference's shift. Same bytes for any number of threads. Errors (kInput): no finite point in the cloud, a
+/// reference without points, or with points that are not finite, or of which none was visible; shifts that
+/// no trajectory bridges. kUsage: an option out of range.
 core::Result<CloudReport> evaluate_cloud(const SurfaceSamples& cloud, const Reference* reference,
                                          const CloudOptions& options,
                                          const std::vector<TrajectoryPair>& trajectories,

@@ -18,8 +18,9 @@ namespace plumbline::evaluate {
 /// A surface as points, metres. `normals` and `visible` are empty or as long as `points`.
 struct SurfaceSamples {
   std::vector<Eigen::Vector3f> points;
-  std::vector<Eigen::Vector3f> normals;  ///< unit; zero = unknown
-  std::vector<std::uint8_t> visible;     ///< not 0: some camera could have seen it
+  std::vector<Eigen::Vector3f> normals;             ///< unit; zero = unknown
+  std::vector<std::uint8_t> visible;                ///< not 0: some camera could have seen it
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();  ///< a point is at `shift` + its coordinates
 };
 
 struct TriangleMesh {
@@ -33,12 +34,14 @@ struct Reference {
   std::string name;  ///< for messages
   SurfaceSamples samples;
   TriangleMesh mesh;
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();  ///< as SurfaceSamples::shift, of both
 };
 
 /// Reads a PLY (x y z, optional nx ny nz, `visible`, and faces, polygons being split into fans) or, without
 /// faces and `visible`, whatever cloud::read_cloud reads. Errors (kInput) name the file and the place: not
 /// such a file, no points, the number of points whose coordinates are not finite, a file that ends before
-/// what its header promises, a face with a vertex out of range.
+/// what its header promises, a face with a vertex out of range. Coordinates with more digits than a float
+/// has, such as UTM's, are read less a shift, here and in load_cloud.
 core::Result<Reference> load_reference(const std::filesystem::path& file);
 
 /// The cloud under test, in the order of the file; points that are not finite stay, evaluate_cloud counts

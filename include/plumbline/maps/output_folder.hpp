@@ -17,7 +17,8 @@ class OutputFolder {
  public:
   /// Checks and makes OUT.partial. kUsage: OUT exists and `replace` is false, or OUT is neither empty nor an
   /// earlier result (then `replace` does not help: nothing else is ever deleted), or another run is writing
-  /// there. kOutput: cannot be created or written, or less than 64 MB are free. `is_earlier` recognises an
+  /// there, or an interrupted one left its map in OUT.partial and neither `replace` nor `takes_over` is true.
+  /// kOutput: cannot be created or written, or less than 64 MB are free. `is_earlier` recognises an
   /// earlier result, which alone may be deleted.
   using IsEarlier = bool (*)(const std::filesystem::path&);
   /// `takes_over`: continues an interrupted run from OUT.partial, which stays there again unless committed.

@@ -20,6 +20,10 @@ struct PageServerOptions {
 /// "HOST:PORT", "HOST" or "PORT"; [::1] in brackets. Errors (kUsage).
 core::Result<PageServerOptions> page_server_options(const std::string& address, const std::string& token);
 
+/// Checks that a server could listen there, before a page is made for it. Errors (kUsage): what is wrong with
+/// host or port.
+core::Result<void> check_listening(const PageServerOptions& options);
+
 /// Limits of a server: connections at once (the rest are closed unread); event streams;
 /// threads for pages besides them; events that wait for a slow stream, which loses the oldest beyond.
 struct PageServerLimits {

@@ -22,7 +22,7 @@ struct Meeting {
   std::string a;
   std::string b;
   double time_s = 0.0;     ///< time in the recordings
-  std::int64_t frame = 0;  ///< number of the frame in the run
+  std::int64_t frame = 0;  ///< number of the frame in the run; of a hub: of the search
   bool taken_back = false;
 };
 

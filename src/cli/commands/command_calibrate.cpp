@@ -14,7 +14,9 @@
 #include "plumbline/features/frame_features.hpp"
 #include "plumbline/mapping/camera_calibration.hpp"
 #include "plumbline/mapping/slam.hpp"
+#include "plumbline/maps/output_check.hpp"
 #include "plumbline/pipeline/input.hpp"
+#include "plumbline/sensor/camera_file.hpp"
 
 namespace plumbline::cli {
 namespace {
@@ -124,7 +126,31 @@ void print(const mapping::CameraCalibration& calibration) {
              100.0 * calibration.gain);
 }
 
+/// Reports a problem with the output before anything is read.
+core::Result<void> check_camera_output(const CalibrateRequest& request) {
+  const std::filesystem::path& output = request.output;
+  if (output.extension() != ".yaml" && output.extension() != ".yml") {
+    return core::usage_error(
+        fmt::format("{}: cameras are written as YAML; let the name end in .yaml", output.string()));
+  }
+
+  std::vector<std::filesystem::path> inputs(request.inputs.begin(), request.inputs.end());
+  inputs.emplace_back(request.open.camera);
+  if (auto free = maps::check_output(output, inputs); !free) return free;
+
+  std::error_code ec;
+  if (std::filesystem::is_regular_file(output, ec) && !sensor::read_camera_file(output)) {
+    return core::usage_error(
+        fmt::format("{}: is there and is not a camera file; choose another name", output.string()));
+  }
+  return core::check_writable(output);
+}
+
 core::Result<void> calibrate(const CalibrateRequest& request, Session& session) {
+  if (!request.output.empty()) {
+    if (auto fit = check_camera_output(request); !fit) return fit;
+  }
+
   Mapped mapped;
   for (const std::string& input : request.inputs) {
     if (auto added = mapped.add(input, request, session); !added) return added;

@@ -2,8 +2,10 @@
 // plumbline convert RECORDING OUT
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 #include <string>
+#include <system_error>
 
 #include "app.hpp"
 #include "plumbline/dataset/convert.hpp"
@@ -20,7 +22,31 @@ struct ConvertRequest {
   bool replace = false;
 };
 
+/// True if `inner` is `outer` or lies in it; links are followed.
+bool lies_in(const std::filesystem::path& inner, const std::filesystem::path& outer) {
+  const auto ends = std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end());
+  return ends.first == outer.end();
+}
+
+/// Refuses a copy that would replace what it is made from.
+core::Result<void> check_places(const std::filesystem::path& input, const std::filesystem::path& output) {
+  std::error_code ec;
+  if (!std::filesystem::exists(input, ec)) return {};
+  const auto resolved = [&ec](const std::filesystem::path& path) {
+    const auto real = std::filesystem::weakly_canonical(path, ec);
+    return real.has_filename() ? real : real.parent_path();
+  };
+  const std::filesystem::path from = resolved(input);
+  const std::filesystem::path to = resolved(output);
+  if (!lies_in(from, to) && !lies_in(to, from) && !std::filesystem::equivalent(from, to, ec)) return {};
+  return core::usage_error(
+      fmt::format("{}: is the recording that is read, or lies in it, or contains it; "
+                  "choose another place",
+                  output.string()));
+}
+
 core::Result<void> convert(Session& session, ConvertRequest& request) {
+  if (auto apart = check_places(request.input, request.output); !apart) return apart;
   const auto pipelines = session.pipelines_folder();
   if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
   request.open.cameras_folder = *pipelines / "cameras";

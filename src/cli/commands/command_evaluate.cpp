@@ -15,6 +15,7 @@
 #include "plumbline/dataset/recording_poses.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/evaluate/trajectory.hpp"
+#include "plumbline/maps/result_folder.hpp"
 #include "plumbline/viz/trajectory_plots.hpp"
 
 namespace plumbline::cli {
@@ -68,6 +69,19 @@ core::Result<void> write_plots(const std::vector<evaluate::NamedReport>& reports
 tl::unexpected<core::Error> about(const fs::path& file, core::Error error) {
   error.message = fmt::format("{}: {}", file.string(), error.message);
   return tl::unexpected<core::Error>(std::move(error));
+}
+
+/// The trajectory that a file or a result folder holds.
+core::Result<dataset::TrajectoryReading> read_estimate(const fs::path& given) {
+  const fs::path file = file_in(given, "trajectory.txt");
+  std::error_code ignored;
+  if (file == given || fs::exists(file, ignored)) return dataset::read_trajectory_file(file);
+
+  const std::vector<fs::path> robots = maps::ResultFolder{given}.robot_folders();
+  if (robots.front() == given) return dataset::read_trajectory_file(file);
+  return core::input_error(
+      fmt::format("{}: has a path for each of its {} robots; name one of them, such as {}", given.string(),
+                  robots.size(), robots.front().string()));
 }
 
 /// Frames of the run that wrote a result folder; 0: not known.
@@ -131,7 +145,7 @@ core::Result<std::vector<evaluate::NamedReport>> measure_paths(const TrajectoryR
   std::vector<evaluate::NamedReport> reports;
   for (std::size_t i = 0; i < estimates.size(); ++i) {
     const fs::path file = file_in(estimates[i], "trajectory.txt");
-    auto estimate = dataset::read_trajectory_file(file);
+    auto estimate = read_estimate(estimates[i]);
     if (!estimate) return tl::unexpected<core::Error>(estimate.error());
 
     dataset::TrajectoryReading fitting_truth = *truth;

@@ -55,23 +55,31 @@ core::Result<std::vector<evaluate::TrajectoryPair>> read_pairs(const CloudReques
   return pairs;
 }
 
-/// The cloud by its distance to the truth and, if that was sampled, the truth by its distance to the cloud.
-core::Result<void> write_error_clouds(const evaluate::SurfaceSamples& cloud,
+/// The cloud by its distance to the truth and, if that was sampled, the truth by its distance to the cloud;
+/// `shift`: of the reference.
+core::Result<void> write_error_clouds(const evaluate::SurfaceSamples& cloud, const Eigen::Vector3d& shift,
                                       const evaluate::CloudReport& report,
                                       const std::vector<evaluate::TrajectoryPair>& pairs,
                                       const fs::path& folder) {
   std::vector<geometry::Trajectory> cameras;
   for (const evaluate::TrajectoryPair& pair : pairs) cameras.push_back(pair.truth);
+  for (geometry::Trajectory& camera : cameras) {
+    for (geometry::StampedPose& pose : camera) pose.world_from_camera.translation -= shift;
+  }
+
   evaluate::SurfaceSamples moved = cloud;
-  evaluate::move(report.alignment.reference_from_cloud, moved);
+  geometry::Rigid3 placed = report.alignment.reference_from_cloud;  // of the files' coordinates
+  placed.translation += placed.rotation * cloud.shift - shift;
+  evaluate::move(placed, moved);
+  moved.shift = shift;
   if (auto done = write_error_cloud(folder / "accuracy", "Distance of the cloud to the true surface", moved,
                                     report.error_m, cameras);
       !done) {
     return done;
   }
   return write_error_cloud(folder / "completeness", "Distance of the true surface to the cloud",
-                           {report.reference_samples, report.reference_normals, {}}, report.reference_error_m,
-                           cameras);
+                           {report.reference_samples, report.reference_normals, {}, shift},
+                           report.reference_error_m, cameras);
 }
 
 core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
@@ -103,6 +111,7 @@ core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
     pairs = std::move(*read);
   }
 
+  if (!cloud->shift.isZero(0.0)) session.console().info("shift: " + shift_text(cloud->shift));
   const auto report = evaluate::evaluate_cloud(*cloud, request.reference.empty() ? nullptr : &*reference,
                                                request.options, pairs, session.executor());
   if (!report) {  // not about the reference, which has been read
@@ -116,8 +125,13 @@ core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
   }
 
   fmt::print("{}", request.json ? evaluate::to_json(*report) : evaluate::to_text(*report));
-  if (request.output.empty()) return {};
-  return write_error_clouds(*cloud, *report, pairs, request.output);
+  if (!request.output.empty()) {
+    auto done = write_error_clouds(*cloud, reference->shift, *report, pairs, request.output);
+    if (!done) return done;
+  }
+  if (!report->alignment.failed) return {};
+  return core::failure(core::ErrorKind::kUntrustworthy,
+                       fmt::format("{}: could not be aligned with {}", cloud_file.string(), reference->name));
 }
 
 }  // namespace

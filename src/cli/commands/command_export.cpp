@@ -8,6 +8,7 @@
 #include "app.hpp"
 #include "option_flags.hpp"
 #include "plumbline/exports/export.hpp"
+#include "plumbline/maps/output_check.hpp"
 #include "plumbline/maps/stored_run.hpp"
 #include "recording_opener.hpp"
 #include "terminal/silenced_stdio.hpp"
@@ -35,11 +36,13 @@ exports::Content content_of(const ExportCommand& command) {
 }
 
 core::Result<void> export_keyframes(const ExportCommand& command) {
+  if (auto free = maps::check_output(command.keyframes, {}); !free) return free;
   auto place = maps::find_map(command.request.input);
   if (!place) return tl::unexpected<core::Error>(place.error());
   if (place->store.empty()) {
     return core::usage_error(fmt::format(
-        "--keyframes: {} has no map.db with the clouds of keyframes; map again without store.enabled=off",
+        "--keyframes: {} has no map.db with the clouds of keyframes; map again with a pipeline that tracks "
+        "and without store.enabled=off",
         command.request.input.string()));
   }
   place->robot = command.request.robot;

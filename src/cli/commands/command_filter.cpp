@@ -12,6 +12,7 @@
 #include "app.hpp"
 #include "plumbline/cloud/columns.hpp"
 #include "plumbline/cloud/filters/filter_chain.hpp"
+#include "plumbline/maps/output_check.hpp"
 
 namespace plumbline::cli {
 namespace {
@@ -34,8 +35,9 @@ core::Result<cloud::FilterChain> load_chain(const std::string& name, const Sessi
 }
 
 /// Reports a problem with the output before anything is read.
-core::Result<void> check_output(const fs::path& output, const cloud::FilterChain& chain) {
-  const auto extension = output.extension();
+core::Result<void> check_outputs(const FilterRequest& request, const cloud::FilterChain& chain) {
+  const fs::path& output = request.files.back();
+  const std::string extension = CLI::detail::to_lower(output.extension().string());
   if (extension != ".ply" && extension != ".pcd") {
     return core::usage_error(fmt::format("{}: clouds are written as .ply or .pcd", output.string()));
   }
@@ -49,7 +51,12 @@ core::Result<void> check_output(const fs::path& output, const cloud::FilterChain
       return core::usage_error(output.string() + ": a filter of the chain writes this file already");
     }
   }
-  return {};
+
+  const std::vector<fs::path> inputs(request.files.begin(), request.files.end() - 1);
+  for (const std::string& written : chain.writes()) {
+    if (auto free = maps::check_output(written, inputs); !free) return free;
+  }
+  return maps::check_output(output, inputs);
 }
 
 /// The inputs one after the other, in the frame of the first.
@@ -64,6 +71,9 @@ core::Result<cloud::CloudPtr> read_inputs(const FilterRequest& request, cloud::C
       columns = std::move(file->columns);
       shift = file->shift;
     } else {
+      auto fits = cloud::check_one_frame(request.files.front().string(), shift, request.files[i].string(),
+                                         file->shift);
+      if (!fits) return tl::unexpected<core::Error>(fits.error());
       cloud::change_shift(*file->cloud, file->shift, shift);
       cloud::append_columns(columns, all->size(), file->columns, file->cloud->size());
       *all += *file->cloud;
@@ -95,7 +105,7 @@ core::Result<void> filter(const FilterRequest& request, Session& session) {
   const fs::path& output = request.files.back();
   cloud::FilterContext context;
   context.executor = &session.executor();
-  if (auto fit = check_output(output, *chain); !fit) return fit;
+  if (auto fit = check_outputs(request, *chain); !fit) return fit;
   if (auto fit = chain->ready(context); !fit) return fit;
 
   cloud::CloudColumns columns;

@@ -76,6 +76,10 @@ core::Result<void> describe_store(const std::filesystem::path& file) {
 core::Result<void> describe_result(const std::filesystem::path& folder) {
   std::ifstream stream(folder / "summary.json");
   const auto json = nlohmann::ordered_json::parse(stream, nullptr, false);
+  if (!stream.is_open()) {
+    return core::input_error(
+        fmt::format("{}: cannot be read: no permission", (folder / "summary.json").string()));
+  }
   if (!json.is_object()) {
     return core::input_error(
         fmt::format("{}: is not valid JSON; map again", (folder / "summary.json").string()));
@@ -95,6 +99,11 @@ core::Result<void> describe_cloud(const std::filesystem::path& file) {
     if (!position.isFinite().all()) continue;
     low = low.min(position);
     high = high.max(position);
+  }
+
+  if (read->cloud->empty()) {
+    fmt::print("points: 0\nnote: the cloud is empty\n");
+    return {};
   }
 
   fmt::print("points: {}\nwithout position: {}\n", read->cloud->size(), read->nan_points);

@@ -2,8 +2,11 @@
 // plumbline map INPUT -o OUT
 #include <fmt/format.h>
 
+#include <filesystem>
+#include <fstream>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -15,6 +18,18 @@
 namespace plumbline::cli {
 namespace {
 
+/// "83 of 400 frames" for the result of a run that Ctrl-C ended; "" for others.
+std::string stopped_after(const std::filesystem::path& result) {
+  std::ifstream stream(result / "summary.json");
+  const auto summary = nlohmann::json::parse(stream, nullptr, false);
+  if (!summary.is_object() || summary.value("stopped", nlohmann::json()) != true) return "";
+  const auto count = [&](const char* name) {
+    const nlohmann::json::json_pointer place(name);
+    return summary.contains(place) ? summary.at(place).dump() : std::string("?");
+  };
+  return fmt::format("{} of {} frames", count("/frames/read"), count("/frames/available"));
+}
+
 int map(Session& session, pipeline::MapRequest request, const std::vector<std::string>& inputs,
         const std::string& publish, const PageAddress& page) {
   const bool as_given = request.open.poses == dataset::PoseUse::kGiven;
@@ -24,8 +39,18 @@ int map(Session& session, pipeline::MapRequest request, const std::vector<std::s
 
   if (auto equipped = session.equip(request); !equipped) return session.fail(equipped.error());
   if (request.resume && pipeline::is_finished(request.output)) {
-    if (!session.quiet)
-      fmt::print("{}: is finished; there is nothing to continue\n", request.output.string());
+    if (const std::string stopped = stopped_after(request.output); !stopped.empty()) {
+      return session.fail({core::ErrorKind::kUsage,
+                           fmt::format("{}: was stopped after {} and cannot be continued; leave out --resume "
+                                       "and add --force to map again",
+                                       request.output.string(), stopped)});
+    }
+    if (!session.quiet) {
+      fmt::print(
+          "{}: is finished; there is nothing to continue; to map again, with other options too, leave "
+          "out --resume and add --force\n",
+          request.output.string());
+    }
     return 0;
   }
 
@@ -63,7 +88,7 @@ void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& 
                   "Poses that come with a recording: prior lets a phone's odometry start each frame's search "
                   "(default), given maps with the recording's poses as they are, ignore leaves them out")
       ->type_name("prior|given|ignore")
-      ->transform(CLI::CheckedTransformer(uses));
+      ->transform(one_of(uses));
 
   command
       .add_option("--pace", request.pace_hz,

@@ -4,8 +4,10 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
+#include <algorithm>
 #include <memory>
 #include <optional>
+#include <set>
 #include <system_error>
 
 #include "app.hpp"
@@ -15,6 +17,7 @@
 #include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/cloud/io/ply.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
+#include "plumbline/maps/output_check.hpp"
 #include "plumbline/maps/output_folder.hpp"
 #include "plumbline/maps/stored_run.hpp"
 #include "plumbline/viz/snapshot.hpp"
@@ -39,12 +42,18 @@ struct RenderRequest {
 
 /// "1600x1200"
 core::Result<void> parse_size(const std::string& text, viz::SnapshotOptions& options) {
+  constexpr int kLeast = 64;
+  constexpr int kMost = 8192;
   int width = 0;
   int height = 0;
   int used = 0;
-  if (std::sscanf(text.c_str(), "%5dx%5d%n", &width, &height, &used) != 2 ||
-      static_cast<std::size_t>(used) != text.size() || width < 1 || height < 1) {
+  if (std::sscanf(text.c_str(), "%9dx%9d%n", &width, &height, &used) != 2 ||
+      static_cast<std::size_t>(used) != text.size()) {
     return core::usage_error(fmt::format("--size: '{}' is not a size; write it as 1600x1200", text));
+  }
+  if (std::min(width, height) < kLeast || std::max(width, height) > kMost) {
+    return core::usage_error(
+        fmt::format("--size: '{}': width and height are {} to {} pixels", text, kLeast, kMost));
   }
   options.width_px = width;
   options.height_px = height;
@@ -129,7 +138,7 @@ core::Result<void> add_scalars(const cloud::CloudFile& file, const fs::path& inp
 }
 
 /// Checks the name of the output before anything is drawn.
-core::Result<void> check_output(const RenderRequest& request) {
+core::Result<void> check_ending(const RenderRequest& request) {
   if (request.turntable == 0) {
     if (request.output.extension() == ".png") return {};
     return core::usage_error(
@@ -160,9 +169,13 @@ core::Result<void> turn(const RenderRequest& request, const viz::Scene& scene, C
 core::Result<void> render(RenderRequest& request, Session& session) {
   if (auto applied = request.flags.apply(); !applied) return applied;
   if (!request.size.empty()) {
+    const std::set<std::string> given = request.flags.given();
+    if (given.count("width") + given.count("height") > 0)
+      return core::usage_error("--size: says the same as --width and --height; give only one of them");
     if (auto parsed = parse_size(request.size, request.options); !parsed) return parsed;
   }
-  if (auto checked = check_output(request); !checked) return checked;
+  if (auto checked = check_ending(request); !checked) return checked;
+  if (auto free = maps::check_output(request.output, {request.input}); !free) return free;
 
   const auto found = map_of(request.input, request.robot);
   if (!found) return tl::unexpected<core::Error>(found.error());
@@ -174,6 +187,10 @@ core::Result<void> render(RenderRequest& request, Session& session) {
                                : maps::read_map_cloud(*place, session.executor());
   if (!file) return tl::unexpected<core::Error>(file.error());
 
+  if (file->cloud->empty()) {
+    session.console().warning(fmt::format("{}: the {} has no points", request.input.string(),
+                                          cloud_file ? "cloud" : "map's cloud"));
+  }
   if (!file->shift.isZero(0.0)) session.console().info("shift: " + shift_text(file->shift));
   viz::Scene scene;
   scene.cloud = file->cloud;

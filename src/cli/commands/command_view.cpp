@@ -26,6 +26,7 @@ struct ViewCommand {
 core::Result<void> run_view(ViewCommand& command, Session& session) {
   const auto options = net::page_server_options(command.http, command.token);
   if (!options) return tl::unexpected<core::Error>(options.error());
+  if (auto free = net::check_listening(*options); !free) return free;
   Console& console = session.console();
   command.request.open = recording_opener(session);
   exports::ExportRequest other = command.request;

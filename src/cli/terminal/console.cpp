@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <nlohmann/json.hpp>
 
 namespace plumbline::cli {
@@ -23,10 +24,20 @@ const char* label(core::LogLevel level) {
   return level == core::LogLevel::kWarning ? "warning: " : level == core::LogLevel::kError ? "error: " : "";
 }
 
+double rate_of(std::size_t done, double elapsed_s) {
+  return elapsed_s > 0.0 ? static_cast<double>(done) / elapsed_s : 0.0;
+}
+
+/// ", 31.2 a second" of frames; nothing for other things, and where the time is too short to tell.
+std::string rate_text(std::size_t done, const char* what, double elapsed_s) {
+  constexpr double kLeast_s = 1.0;
+  if (std::strcmp(what, "frames") != 0 || elapsed_s < kLeast_s) return "";
+  return fmt::format(", {:.1f} a second", rate_of(done, elapsed_s));
+}
+
 /// Text for progress whose total is not known.
 std::string counted(std::size_t done, const char* what, double elapsed_s) {
-  const double rate = elapsed_s > 0.0 ? static_cast<double>(done) / elapsed_s : 0.0;
-  return fmt::format("{} {}, {:.1f} a second", done, what, rate);
+  return fmt::format("{} {}{}", done, what, rate_text(done, what, elapsed_s));
 }
 
 }  // namespace
@@ -84,7 +95,7 @@ void Console::progress(std::size_t done, std::size_t total, const char* what) {
 }
 
 void Console::put_line(std::size_t done, std::size_t total, const char* what, double elapsed_s) const {
-  const double rate = elapsed_s > 0.0 ? static_cast<double>(done) / elapsed_s : 0.0;
+  const double rate = rate_of(done, elapsed_s);
   const double left_s = rate > 0.0 && total > 0 ? static_cast<double>(total - done) / rate : 0.0;
   if (style_ == ProgressStyle::kJson) {
     nlohmann::ordered_json object = {{"event", "progress"}, {"what", what},       {"done", done},
@@ -94,8 +105,8 @@ void Console::put_line(std::size_t done, std::size_t total, const char* what, do
     put(object.dump() + "\n");
     return;
   }
-  put(fmt::format("plumbline: {} of {} {}, {:.1f} a second, {} left{}\n", done, total, what, rate,
-                  clock_text(left_s), note_));
+  put(fmt::format("plumbline: {} of {} {}{}, {} left{}\n", done, total, what,
+                  rate_text(done, what, elapsed_s), clock_text(left_s), note_));
 }
 
 void Console::step(const std::string& name) {
@@ -139,10 +150,11 @@ void Console::draw_bar(std::size_t done, std::size_t total, const char* what, do
   }
   const double share = total > 0 ? static_cast<double>(done) / static_cast<double>(total) : 1.0;
   const auto filled = static_cast<std::size_t>(std::lround(share * static_cast<double>(kBarWidth)));
-  const double rate = elapsed_s > 0.0 ? static_cast<double>(done) / elapsed_s : 0.0;
+  const double rate = rate_of(done, elapsed_s);
   const double left_s = rate > 0.0 ? static_cast<double>(total - done) / rate : 0.0;
-  put(fmt::format("[{}{}] {}/{} {}  {:.1f} fps  ETA {}{}", std::string(filled, '='),
-                  std::string(kBarWidth - filled, ' '), done, total, what, rate, clock_text(left_s), note_));
+  put(fmt::format("[{}{}] {}/{} {}{}  ETA {}{}", std::string(filled, '='),
+                  std::string(kBarWidth - filled, ' '), done, total, what, rate_text(done, what, elapsed_s),
+                  clock_text(left_s), note_));
   std::fflush(stderr);
 }
 

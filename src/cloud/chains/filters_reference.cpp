@@ -38,7 +38,8 @@ constexpr const char* kIntroduction =
     "Coordinates with more digits than a 32 bit float has, such as UTM's, are reduced by whole metres "
     "(the `shift` that\n"
     "is printed) and written as doubles with it again; options in metres refer to the coordinates of the "
-    "file. A chain that\n"
+    "file. Inputs that lie\n"
+    "more than 10 km apart are refused, since floats cannot hold both. A chain that\n"
     "leaves no point ends with exit code 4 and names the filter that removed the last one.\n";
 
 std::string allowed(const core::OptionSpec& option) {

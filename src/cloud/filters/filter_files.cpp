@@ -27,6 +27,8 @@ class MergeFilter : public Filter {
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     const auto other = read_cloud(file_, LargeCoordinates::kShifted);
     if (!other) return tl::unexpected<core::Error>(other.error());
+    const auto fits = check_one_frame("the chain's cloud", context.shift, file_, other->shift);
+    if (!fits) return tl::unexpected<core::Error>(fits.error());
     change_shift(*other->cloud, other->shift, context.shift);
     auto output = like(*input);
     output->points.reserve(input->size() + other->cloud->size());

@@ -56,7 +56,8 @@ std::vector<CellColor> shared_colors(const std::vector<std::vector<ColorCell>>& 
   auto kept = all.begin();
   for (auto first = all.begin(), end = first; first != all.end(); first = end) {
     end = std::find_if(first, all.end(), [&](const CellColor& c) { return c.cell != first->cell; });
-    if (end - first > 1) kept = std::move(first, end, kept);
+    if (end - first == 1) continue;
+    kept = kept == first ? end : std::move(first, end, kept);
   }
 
   all.erase(kept, all.end());

@@ -61,6 +61,17 @@ void change_shift(Cloud& cloud, const Eigen::Vector3d& from, const Eigen::Vector
   cloud.sensor_origin_.head<3>() = (cloud.sensor_origin_.head<3>().cast<double>() + step).cast<float>();
 }
 
+core::Result<void> check_one_frame(const std::string& name, const Eigen::Vector3d& shift,
+                                   const std::string& other_name, const Eigen::Vector3d& other_shift) {
+  constexpr double kFloatsHold_m = 10000.0;
+  const double apart_m = (shift - other_shift).norm();
+  if (apart_m <= kFloatsHold_m) return {};
+  return core::input_error(fmt::format(
+      "{} and {} lie {:.0f} km apart, and floats are exact to a millimetre only within 10 km; bring "
+      "both into one frame first, with the filter transform",
+      name, other_name, apart_m / 1000.0));
+}
+
 core::Result<CloudFile> read_cloud(const std::filesystem::path& file, LargeCoordinates large) {
   std::error_code error;
   if (!std::filesystem::exists(file, error)) return core::input_error(file.string() + ": does not exist");

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <stdexcept>
 #include <vector>
@@ -130,7 +131,9 @@ core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& clo
 
 core::Result<void> write_cloud(const std::filesystem::path& file, const Cloud& cloud,
                                const CloudColumns& columns, const Eigen::Vector3d& shift) {
-  const std::string ending = file.extension().string();
+  std::string ending = file.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (ending == ".ply") return write_ply(file, cloud, columns, shift);
   if (ending == ".pcd") return write_pcd(file, cloud, columns, shift);
   return core::usage_error(fmt::format(

@@ -11,6 +11,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <memory>
 #include <utility>
@@ -170,8 +171,11 @@ core::Result<PlyData> make_mesh(const Cloud& cloud, const MeshOptions& options) 
 }
 
 core::Result<void> write_mesh(const std::filesystem::path& file, const PlyData& mesh) {
-  if (file.extension() == ".ply") return write_ply(file, mesh);
-  if (file.extension() == ".obj") return write_obj(file, mesh);
+  std::string ending = file.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (ending == ".ply") return write_ply(file, mesh);
+  if (ending == ".obj") return write_obj(file, mesh);
   return core::usage_error(fmt::format("{}: meshes are written as .ply or .obj", file.string()));
 }
 

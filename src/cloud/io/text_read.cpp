@@ -70,6 +70,17 @@ std::string read_table(ByteReader& reader, TextTable& table) {
   return table.columns == 0 ? "holds no points" : "";
 }
 
+/// True if each row is a stamp, a position and a quaternion of unit length.
+bool is_path(const TextTable& table) {
+  if (table.columns != 8 || table.names.size() == table.columns) return false;
+  for (std::size_t i = 0; i < table.values.size(); i += table.columns) {
+    double squared = 0.0;
+    for (std::size_t c = 4; c < 8; ++c) squared += table.values[i + c] * table.values[i + c];
+    if (!(std::abs(squared - 1.0) < 1e-3)) return false;
+  }
+  return true;
+}
+
 bool looks_like_color(const TextTable& table, std::size_t from) {
   for (std::size_t i = 0; i < table.values.size(); i += table.columns) {
     for (std::size_t c = from; c < from + 3; ++c) {
@@ -120,6 +131,12 @@ core::Result<CloudFile> read_text_cloud(const std::filesystem::path& file, Large
   TextTable table;
   const std::string problem = read_table(reader, table);
   if (!problem.empty()) return error(problem);
+  if (is_path(table)) {
+    return error(
+        "is a path, not a cloud (a stamp, a position and a quaternion in each line); name a cloud or the "
+        "result "
+        "folder");
+  }
 
   const auto meanings = meanings_of(table);
   table.names.resize(table.columns);

@@ -21,7 +21,8 @@ struct BagReaders {
   const MessageDecoder& (*cdr)();
   const MessageDecoder& (*ros1)();
   const MessageEncoder& (*encoder)();
-  std::unique_ptr<BagWriter> (*create_mcap)(const std::filesystem::path& file);
+  /// `made_by`: the program's name in the head of the file.
+  std::unique_ptr<BagWriter> (*create_mcap)(const std::filesystem::path& file, const std::string& made_by);
 };
 
 }  // namespace plumbline::dataset

@@ -3,32 +3,113 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <fstream>
 #include <optional>
+#include <set>
 #include <system_error>
 
 #include "convert/copy_target.hpp"
 #include "images/image_decoders.hpp"
 #include "layout.hpp"
+#include "plumbline/core/output_file.hpp"
 
 namespace plumbline::dataset {
 namespace {
 
 namespace fs = std::filesystem;
 
+/// Endings of recordings, archives and films, which are not written.
+const std::set<std::string> kNotWritten{".bag", ".db3", ".mcap", ".zip", ".tar", ".gz",  ".tgz",
+                                        ".7z",  ".rar", ".mp4",  ".mkv", ".avi", ".mov", ".r3d",
+                                        ".oni", ".klg", ".svo",  ".txt", ".ply", ".pcd", ".yaml"};
+
+core::Result<void> check_folder_name(const fs::path& out) {
+  std::string ending = (out.has_filename() ? out : out.parent_path()).extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (kNotWritten.count(ending) == 0) return {};
+  return core::usage_error(
+      fmt::format("{}: copies are a folder or a file that ends in .mcap; choose another name", out.string()));
+}
+
+/// First bytes of a file; fewer if it is shorter.
+std::string beginning_of(const fs::path& file, std::size_t count) {
+  std::string text(count, '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(text.data(), static_cast<std::streamsize>(count));
+  text.resize(static_cast<std::size_t>(std::max<std::streamsize>(stream.gcount(), 0)));
+  return text;
+}
+
+/// The list of a copy that is being written (core::OutputFile).
+bool is_unfinished_list(const fs::path& file) {
+  return file.filename().string().rfind(".associations.txt.", 0) == 0;
+}
+
+/// True if the folder has no more in it than what a copy consists of, finished or not.
+bool only_parts_of_a_copy(const fs::path& folder) {
+  const std::set<std::string> parts{"rgb", "depth", "camera.yaml", "groundtruth.txt", "associations.txt"};
+  std::error_code ec;
+  for (fs::directory_iterator it(folder, ec), end; !ec && it != end; it.increment(ec)) {
+    if (parts.count(it->path().filename().string()) == 0 && !is_unfinished_list(it->path())) return false;
+  }
+  return !ec;
+}
+
+/// True if convert_recording() wrote what is there: no other recording may be replaced.
+bool is_copy(const fs::path& there, bool file) {
+  std::error_code ec;
+  if (file) {
+    constexpr std::size_t kHead = 64;  // the magic bytes, and the record with the maker
+    const std::string head = beginning_of(there, kHead);
+    return fs::is_regular_file(there, ec) && head.rfind("\x89MCAP", 0) == 0 &&
+           head.find(kCopyMaker) != std::string::npos;
+  }
+  const std::string title = std::string(kCopyTitle) + "\n";
+  return only_parts_of_a_copy(there) && beginning_of(there / "associations.txt", title.size()) == title;
+}
+
 /// Checks that nothing is at `out`, or an earlier copy that may be replaced.
 core::Result<void> make_room(const fs::path& out, bool file, bool replace) {
-  std::error_code ignored;
-  if (!fs::exists(out, ignored)) return {};
-  if (!replace)
+  std::error_code ec;
+  if (!fs::exists(out, ec)) return {};
+  if (!file && fs::is_directory(out, ec) && fs::is_empty(out, ec)) return {};
+  if (!is_copy(out, file)) {
+    return core::usage_error(fmt::format(
+        "{}: exists already and was not written by plumbline convert; choose another name (only copies that "
+        "it wrote, with nothing else in them, are ever replaced)",
+        out.string()));
+  }
+  if (replace) return {};
+  return core::usage_error(fmt::format("{}: exists already; --force replaces an earlier copy", out.string()));
+}
+
+/// Removes what an interrupted copy left where the folder is first written, and nothing else.
+core::Result<void> clear_leftover(const fs::path& partial) {
+  std::error_code ec;
+  if (!fs::exists(partial, ec)) return {};
+  const bool unfinished =
+      std::any_of(fs::directory_iterator(partial, ec), fs::directory_iterator(),
+                  [](const fs::directory_entry& entry) { return is_unfinished_list(entry.path()); });
+  if (!unfinished || !only_parts_of_a_copy(partial)) {
     return core::usage_error(
-        fmt::format("{}: exists already; --force replaces an earlier copy", out.string()));
-  const bool copy =
-      file ? fs::is_regular_file(out, ignored)
-           : fs::is_regular_file(out / "associations.txt", ignored) || fs::is_empty(out, ignored);
-  if (copy) return {};
-  return core::usage_error(
-      fmt::format("{}: exists already and is not a copy of a recording; name another place", out.string()));
+        fmt::format("{}: is in the way: the copy is first written there; move it or choose another name",
+                    partial.string()));
+  }
+  fs::remove_all(partial, ec);
+  return {};
+}
+
+/// Checks the place before a frame is read, and clears it of an interrupted copy.
+core::Result<void> check_place(const fs::path& out, const fs::path& partial, bool file, bool replace) {
+  if (!file) {
+    if (auto fit = check_folder_name(out); !fit) return fit;
+  }
+  if (auto room = make_room(out, file, replace); !room) return room;
+  return file ? core::check_writable(out) : clear_leftover(partial);
 }
 
 /// Moves a folder, which was written beside its destination, to it.
@@ -91,10 +172,9 @@ core::Result<cv::Mat> pixels_of(const StoredImage& image) {
 core::Result<ConvertSummary> convert_recording(const FrameSource& source, const fs::path& out,
                                                const ConvertOptions& options, core::Log& log) {
   const bool file = out.extension() == ".mcap";
-  if (auto room = make_room(out, file, options.replace); !room) return tl::unexpected(room.error());
-  const fs::path folder = file ? fs::path() : fs::path(out.string() + ".partial");
-  std::error_code ignored;
-  if (!file) fs::remove_all(folder, ignored);
+  fs::path folder = out.has_filename() ? out : out.parent_path();  // where it is first written
+  folder += ".partial";
+  if (auto free = check_place(out, folder, file, options.replace); !free) return tl::unexpected(free.error());
   auto target = file ? make_mcap_target(out, source.camera(), log) : make_tum_target(folder, source.camera());
   if (!target) return tl::unexpected(target.error());
 
@@ -103,10 +183,13 @@ core::Result<ConvertSummary> convert_recording(const FrameSource& source, const 
   const bool odometry = source.truth_is_odometry();
   if (odometry)
     log.warning("the poses that the recorder kept are not in the copy: it is tracked without them");
+  if (file && !odometry && source.truth())
+    log.warning("the ground truth is not in the copy: a bag has no place for it; a folder has");
   if (summary) done = (*target)->finish(odometry ? std::nullopt : source.truth());
   if (summary && done && !file) done = put_in_place(folder, out);
 
   if (!summary || !done) {
+    std::error_code ignored;
     if (!file) fs::remove_all(folder, ignored);
     return tl::unexpected(summary ? done.error() : summary.error());
   }

@@ -12,6 +12,10 @@
 
 namespace plumbline::dataset {
 
+/// Marks of copies: the maker in an MCAP file's head, and the first line of associations.txt.
+inline constexpr const char* kCopyMaker = "plumbline convert";
+inline constexpr const char* kCopyTitle = "# stamp of colour, colour, stamp of depth, depth";
+
 class CopyTarget {
  public:
   virtual ~CopyTarget() = default;

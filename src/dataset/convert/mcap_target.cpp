@@ -168,7 +168,7 @@ core::Result<std::unique_ptr<CopyTarget>> make_mcap_target(const std::filesystem
                                                            const sensor::Camera& camera, core::Log& log) {
   const auto& part = core::part<BagReaders>();
   if (!part) return tl::unexpected(part.error());
-  return make_message_target((*part)->create_mcap(file), camera, false, log);
+  return make_message_target((*part)->create_mcap(file, kCopyMaker), camera, false, log);
 }
 
 std::unique_ptr<CopyTarget> make_message_target(std::unique_ptr<BagWriter> bag, const sensor::Camera& camera,

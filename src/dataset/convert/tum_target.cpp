@@ -22,7 +22,7 @@ class TumTarget final : public CopyTarget {
  public:
   TumTarget(std::filesystem::path folder, sensor::Camera camera)
       : folder_(std::move(folder)), camera_(std::move(camera)), list_(folder_ / "associations.txt") {
-    list_.write("# stamp of colour, colour, stamp of depth, depth\n");
+    list_.write(std::string(kCopyTitle) + "\n");
   }
 
   core::Result<void> add(std::int64_t color_ns, std::int64_t depth_ns, const StoredPair& pair) override {

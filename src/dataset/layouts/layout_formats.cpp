@@ -8,6 +8,7 @@
 #include <map>
 
 #include "layout.hpp"
+#include "plumbline/dataset/recording_poses.hpp"
 #include "text_lines.hpp"
 
 namespace plumbline::dataset {
@@ -108,6 +109,28 @@ const LayoutFormat* layout_of(const fs::path& folder) {
     if (format->recognises(folder)) return format;
   }
   return nullptr;
+}
+
+bool is_part_of_recording(const fs::path& file) {
+  std::error_code ec;
+  const fs::path real = fs::weakly_canonical(file, ec);
+  if (ec || !fs::exists(real, ec)) return false;
+  std::string part = real.filename().string();  // the folder or file below `folder`
+  fs::path folder = real.parent_path();
+  constexpr int kDepth = 3;
+  for (int i = 0; i < kDepth; ++i) {
+    if (const LayoutFormat* format = layout_of(folder)) {
+      std::vector<std::string> names{
+          "camera.yaml", "groundtruth.txt", "rgb.txt", "depth.txt", "associations.txt", "rgb", "depth"};
+      for (const std::string& alternatives : format->parts) {
+        for (const std::string& name : split_words(alternatives, "|/")) names.push_back(name);
+      }
+      if (std::find(names.begin(), names.end(), part) != names.end()) return true;
+    }
+    part = folder.filename().string();
+    folder = folder.parent_path();
+  }
+  return false;
 }
 
 std::string not_a_recording_file(const fs::path& file) {

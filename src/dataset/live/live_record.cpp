@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <array>
+#include <fstream>
 #include <system_error>
 
 #include "bags/bag_parts.hpp"
@@ -30,7 +32,15 @@ core::Result<void> LiveRecord::check(const std::filesystem::path& file, bool rep
         fmt::format("--record {}: is written as MCAP; give a name that ends in .mcap", file.string()));
   }
   std::error_code ignored;
-  if (replace || !std::filesystem::exists(file, ignored)) return {};
+  if (!std::filesystem::exists(file, ignored)) return {};
+
+  std::array<char, 5> magic{};
+  std::ifstream(file, std::ios::binary).read(magic.data(), magic.size());
+  if (magic != std::array<char, 5>{'\x89', 'M', 'C', 'A', 'P'}) {
+    return core::usage_error(
+        fmt::format("--record {}: is there and is not an MCAP file; choose another name", file.string()));
+  }
+  if (replace) return {};
   return core::usage_error(fmt::format("--record {}: is there already; --force replaces it", file.string()));
 }
 
@@ -38,8 +48,8 @@ core::Result<std::unique_ptr<LiveRecord>> LiveRecord::create(const std::filesyst
                                                              Infos infos, sensor::Camera camera) {
   const auto& part = core::part<BagReaders>();
   if (!part) return tl::unexpected(part.error());
-  return std::unique_ptr<LiveRecord>(
-      new LiveRecord((*part)->create_mcap(file), std::move(topics), std::move(infos), std::move(camera)));
+  return std::unique_ptr<LiveRecord>(new LiveRecord((*part)->create_mcap(file, "plumbline"),
+                                                    std::move(topics), std::move(infos), std::move(camera)));
 }
 
 void LiveRecord::begin(std::int64_t stamp_ns) {

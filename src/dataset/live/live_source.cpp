@@ -212,6 +212,7 @@ core::Result<std::unique_ptr<FrameSource>> open_live(const std::string& address,
   // The first frames say the rest, as those of a recording do.
   const auto camera = complete_live_camera(address, options, *chosen, *found, *topics, live->layout, log);
   if (!camera) return tl::unexpected(camera.error());
+  if (auto likely = check_focal_lengths(*camera, address); !likely) return tl::unexpected(likely.error());
   auto source =
       std::make_unique<LiveSource>(live, *camera, camera->color, std::vector<double>{camera->depth_delay_s});
   const auto doubt = check_depth_scale(*source, address);

@@ -51,7 +51,7 @@ Density density(const PointIndex& index, const core::Executor& executor) {
   constexpr std::size_t kNeighbors = 16;
   constexpr std::size_t kMost = 100000;
   constexpr double kPi = 3.14159265358979323846;
-  if (index.size() <= kNeighbors) return {};
+  if (index.size() < 2) return {};
 
   const std::size_t stride = (index.size() + kMost - 1) / kMost;
   const std::size_t count = (index.size() + stride - 1) / stride;
@@ -65,7 +65,7 @@ Density density(const PointIndex& index, const core::Executor& executor) {
       const auto other = std::find_if(found.begin(), found.end(),
                                       [](const Neighbor& n) { return n.squared_distance > 0.0; });
       if (other != found.end()) nearest[i] = std::sqrt(other->squared_distance);
-      sixteenth[i] = found.back().squared_distance;
+      if (found.size() > kNeighbors) sixteenth[i] = found.back().squared_distance;
     }
   });
 

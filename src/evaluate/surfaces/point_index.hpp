@@ -67,7 +67,8 @@ struct Density {
   /// Edge of the square that one sample stands for, 1 / sqrt(points_per_m2).
   [[nodiscard]] double cell_m() const;
 };
-/// From up to 100 000 points spread over all. Zeros for fewer than 17 points, or when all are at one place.
+/// From up to 100 000 points spread over all. Zeros when all are at one place; points_per_m2 is 0 for fewer
+/// than 17 points, too.
 Density density(const PointIndex& index, const core::Executor& executor);
 
 /// Normal of the points `found` by principal components, up to sign; zero unless they are flat: their spread

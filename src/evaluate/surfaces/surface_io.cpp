@@ -78,11 +78,12 @@ core::Result<Reference> load_reference(const std::filesystem::path& file) {
     auto samples = load_cloud(file);
     if (!samples) return tl::unexpected(samples.error());
     if (const auto ok = check_reference(file, samples->points); !ok) return tl::unexpected(ok.error());
+    reference.shift = samples->shift;
     reference.samples = std::move(*samples);
     return reference;
   }
 
-  const auto ply = cloud::read_ply(file);
+  const auto ply = cloud::read_ply(file, true);
   if (!ply) return tl::unexpected(ply.error());
   if (ply->vertex_count == 0)
     return core::input_error(fmt::format("{}: the reference has no points", file.string()));
@@ -92,22 +93,25 @@ core::Result<Reference> load_reference(const std::filesystem::path& file) {
     return core::input_error(fmt::format("{}: has no properties x, y and z", file.string()));
   if (const auto ok = check_reference(file, points); !ok) return tl::unexpected(ok.error());
 
+  reference.shift = Eigen::Map<const Eigen::Vector3d>(ply->shift.data());
   if (!ply->triangles.empty()) {
     reference.mesh = {std::move(points), ply->triangles, visibility(*ply)};
     return reference;
   }
 
-  reference.samples = {std::move(points), vectors(*ply, "nx", "ny", "nz"), visibility(*ply)};
+  reference.samples = {std::move(points), vectors(*ply, "nx", "ny", "nz"), visibility(*ply), reference.shift};
   tidy_normals(reference.samples.normals);
   return reference;
 }
 
 core::Result<SurfaceSamples> load_cloud(const std::filesystem::path& file) {
-  const auto read = cloud::read_cloud(file);
+  const auto read = cloud::read_cloud(file, cloud::LargeCoordinates::kShifted);
   if (!read) return tl::unexpected(read.error());
   if (read->cloud->empty())
     return core::input_error(fmt::format("{}: the cloud has no points", file.string()));
-  return samples_of(*read->cloud);
+  SurfaceSamples samples = samples_of(*read->cloud);
+  samples.shift = read->shift;
+  return samples;
 }
 
 SurfaceSamples samples_of(const cloud::Cloud& cloud) {

@@ -177,7 +177,7 @@ void put_las_points(core::OutputFile& out, const cloud::CloudFile& file, const L
 }
 
 core::Result<ExportSummary> write_las(MapSource& source, const std::filesystem::path& output) {
-  const auto reference = georeference_of(source.options());
+  const auto reference = georeference_of(source.options(), source.log());
   if (!reference) return tl::unexpected(reference.error());
   const auto cloud = source.cloud();
   if (!cloud) return tl::unexpected(cloud.error());

@@ -53,7 +53,7 @@ Format pcd_format() {
       {Content::kCloud},
       "",
       "Cloud as PCD",
-      "For PCL; binary, with the same columns as PLY. `--ascii` writes text: positions, colours, normals.",
+      "For PCL; binary, with the same columns as PLY. `--ascii on` writes text: positions, colours, normals.",
       {"voxel", "ascii"},
       &write_pcd_cloud};
 }

@@ -31,7 +31,7 @@ core::Result<void> write_ascii_ply(const std::filesystem::path& output, const cl
 }
 
 core::Result<ExportSummary> write_ply_cloud(MapSource& source, const std::filesystem::path& output) {
-  const auto reference = georeference_of(source.options());
+  const auto reference = georeference_of(source.options(), source.log());
   if (!reference) return tl::unexpected(reference.error());
   const auto cloud = source.cloud();
   if (!cloud) return tl::unexpected(cloud.error());

@@ -5,6 +5,7 @@
 #include "formats.hpp"
 #include "grids/grid.hpp"
 #include "plumbline/core/output_file.hpp"
+#include "plumbline/maps/output_check.hpp"
 
 namespace plumbline::exports {
 namespace {
@@ -30,13 +31,14 @@ core::Result<void> write_pgm(const std::filesystem::path& file, const Grid& grid
 }
 
 core::Result<ExportSummary> write_nav2(MapSource& source, const std::filesystem::path& output) {
-  const auto grid = make_grid(source);
-  if (!grid) return tl::unexpected(grid.error());
-
   std::filesystem::path image = output;
   std::filesystem::path yaml = output;
   image.replace_extension(".pgm");
   yaml.replace_extension(".yaml");
+  if (auto free = maps::check_output(yaml, {}); !free) return tl::unexpected(free.error());
+
+  const auto grid = make_grid(source);
+  if (!grid) return tl::unexpected(grid.error());
   if (auto written = write_pgm(image, *grid, source.frame_text()); !written)
     return tl::unexpected(written.error());
 

@@ -19,7 +19,7 @@ core::Result<ExportSummary> write_octomap(MapSource& source, const std::filesyst
 
   OctreeWork work;
   work.resolution_m = source.options().resolution_m > 0.0 ? source.options().resolution_m : kDefault_m;
-  work.color = output.extension() == ".ot";
+  work.color = lower(output.extension().string()) == ".ot";
   work.frame = source.frame_text();
   work.cloud = *cloud;
   work.box = source.selected();

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <proj.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 
@@ -56,14 +57,35 @@ core::Result<void> describe_system(int epsg, Georeference& reference) {
   return {};
 }
 
+/// From longitude and latitude, degrees, into the system.
+Pj from_degrees_into(PJ_CONTEXT* context, int epsg) {
+  const Pj given(proj_create_crs_to_crs(context, "EPSG:4326", fmt::format("EPSG:{}", epsg).c_str(), nullptr));
+  return Pj(given ? proj_normalize_for_visualization(context, given.get()) : nullptr);
+}
+
+bool covers_origin(const Georeference& reference) {
+  constexpr double kSlack = 3.0;       // degrees: zones are used a little beyond their border
+  constexpr double kUnknown = -999.0;  // PROJ gives -1000 for a border that it does not know
+  const Context context = quiet_context();
+  const Pj system(proj_create(context.get(), fmt::format("EPSG:{}", reference.epsg).c_str()));
+  const Pj from_degrees = from_degrees_into(context.get(), reference.epsg);
+  double west = 0.0, south = 0.0, east = 0.0, north = 0.0;
+  const bool known = system && from_degrees &&
+                     proj_get_area_of_use(context.get(), system.get(), &west, &south, &east, &north, nullptr);
+  if (!known || std::min({west, south, east, north}) < kUnknown) return true;
+
+  const PJ_COORD at = proj_trans(from_degrees.get(), PJ_INV,
+                                 proj_coord(reference.origin.x(), reference.origin.y(), 0.0, 0.0));
+  if (!std::isfinite(at.xy.x + at.xy.y) || at.xy.y < south - kSlack || at.xy.y > north + kSlack) return false;
+  const double width = east - west + (east < west ? 360.0 : 0.0);
+  return std::abs(std::remainder(at.xy.x - west - 0.5 * width, 360.0)) <= 0.5 * width + kSlack;
+}
+
 core::Result<void> place_map(double latitude, double longitude, double heading, Georeference& reference) {
   constexpr double kStep = 1e-4;  // degrees: about 11 m
   constexpr double kRadians = M_PI / 180.0;
   const Context context = quiet_context();
-  const Pj given(proj_create_crs_to_crs(context.get(), "EPSG:4326",
-                                        fmt::format("EPSG:{}", reference.epsg).c_str(), nullptr));
-  const Pj from_degrees(given ? proj_normalize_for_visualization(context.get(), given.get()) : nullptr);
-
+  const Pj from_degrees = from_degrees_into(context.get(), reference.epsg);
   const Pj globe(proj_create(context.get(), "EPSG:4326"));
   const auto fail = [&] {
     return core::usage_error(
@@ -93,4 +115,4 @@ core::Result<void> place_map(double latitude, double longitude, double heading, 
 }  // namespace plumbline::exports
 
 namespace px = plumbline::exports;
-PLUMBLINE_PART(px::ProjFunctions, &px::describe_system, &px::place_map)
+PLUMBLINE_PART(px::ProjFunctions, &px::describe_system, &px::place_map, &px::covers_origin)

@@ -38,10 +38,10 @@ core::Result<ExportSummary> write_kitti(MapSource& source, const std::filesystem
   const auto paths = paths_of(source);
   if (!paths) return tl::unexpected(paths.error());
   if (paths->size() > 1 && output.has_extension()) {
-    return core::usage_error(
-        fmt::format("{}: KITTI's rows have neither stamps nor names to tell {} robots apart; name a folder "
-                    "instead, which gets a file for each",
-                    output.string(), paths->size()));
+    return core::usage_error(fmt::format(
+        "{}: KITTI's rows have neither stamps nor names to tell {} robots apart; name a folder and "
+        "the format, which gets a file for each: --format kitti -o FOLDER",
+        output.string(), paths->size()));
   }
 
   return write_robot_files(source, output, ".kitti", [](core::OutputFile& out, const auto& all) {
@@ -114,8 +114,10 @@ Format tum_format() {
       "",
       "Path, TUM",
       "`stamp tx ty tz qx qy qz qw`, seconds and metres; read by evo and `plumbline evaluate trajectory`. "
-      "Several robots are written to one file with a comment line before each, or, if the output has no "
-      "ending, to a folder with a file each. `--body` writes the path of a body that carries the camera.",
+      "Several robots are written to one file with a comment line before each, or to a folder with a file "
+      "each: "
+      "name a folder and the format, `--format tum -o FOLDER`. `--body` writes the path of a body that "
+      "carries the camera.",
       {"body"},
       &write_tum};
 }
@@ -127,7 +129,7 @@ Format kitti_format() {
           "",
           "Path, KITTI",
           "A row of a 3 x 4 matrix per tracked frame, world from camera, without stamps; for several robots "
-          "a folder with a file each.",
+          "a folder with a file each: `--format kitti -o FOLDER`.",
           {"body"},
           &write_kitti};
 }

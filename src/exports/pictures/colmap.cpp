@@ -197,7 +197,7 @@ core::Result<ExportSummary> write_colmap(MapSource& source, const std::filesyste
   if (written) written = folder->commit();
   if (!written) return tl::unexpected(written.error());
   summary.written = {output};
-  summary.notes.push_back(fmt::format("{} pictures, {} points", model.pictures.size(), model.points.size()));
+  summary.notes.push_back(fmt::format("{}, {} points", pictures_text(model.pictures), model.points.size()));
   return summary;
 }
 
@@ -210,12 +210,13 @@ Format colmap_format() {
       {Content::kCloud},
       "map.db, recording",
       "COLMAP model for Gaussian splatting and MVS",
-      "A folder with `sparse/0` (`--text`: text files) and `images/`, undistorted and numbered. Poses are "
+      "A folder with `sparse/0` (`--text on`: text files) and `images/`, undistorted and numbered. Poses are "
       "camera_from_world; half a pixel is added to the principal point and to every 2D point, as COLMAP has "
       "the middle of the top left pixel at (0.5, 0.5). Points are the landmarks that at least two keyframes "
       "see, with their tracks and the cloud's colours; `--dense-points 100000` takes points of the cloud "
       "instead, which have no tracks. Pictures are the keyframes'; `--every N` adds every N-th tracked "
-      "frame, `--sharpest` takes the sharpest picture near each keyframe, which suits splatting better (only "
+      "frame, `--sharpest on` takes the sharpest picture near each keyframe, which suits splatting better "
+      "(only "
       "keyframes have tracks). The recording is found by the map, or given with `--recording`, one for each "
       "robot; if it is missing, the model has only poses, and the program says so.",
       {"text", "every", "sharpest", "dense_points", "voxel"},

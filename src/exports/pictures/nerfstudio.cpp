@@ -106,7 +106,7 @@ core::Result<ExportSummary> write_nerfstudio(MapSource& source, const std::files
   if (!written) return tl::unexpected(written.error());
 
   summary.written = {folder_name};
-  summary.notes.push_back(fmt::format("{} pictures", pictures->size()));
+  summary.notes.push_back(pictures_text(*pictures));
   return summary;
 }
 

@@ -208,11 +208,11 @@ core::Result<Drawing> section_drawing(MapSource& source, ExportSummary& summary)
 }
 
 core::Result<ExportSummary> write_plan(MapSource& source, const std::filesystem::path& output) {
-  const auto reference = georeference_of(source.options());
+  const auto reference = georeference_of(source.options(), source.log());
   if (!reference) return tl::unexpected(reference.error());
 
   const bool section = !source.options().section.empty();
-  const std::string ending = output.extension().string();
+  const std::string ending = lower(output.extension().string());
   if (*reference && (ending != ".dxf" || section)) {
     return core::usage_error(
         fmt::format("{}: only a plan as .dxf is moved into world coordinates; leave --datum and "

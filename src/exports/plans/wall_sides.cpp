@@ -29,13 +29,15 @@ struct Side {
   std::size_t points = 0;
 };
 
-evaluate::SurfaceSamples upright_samples(const cloud::CloudFile& file, double floor_m) {
+/// Points of walls, with their height over the floor as z: planes that are a little askew meet the plan
+/// there.
+evaluate::SurfaceSamples upright_samples(const cloud::Cloud& cloud, double floor_m) {
   constexpr double kFoot_m = 0.1;  // skirting
   evaluate::SurfaceSamples samples;
-  for (const cloud::Point& p : *file.cloud) {
+  for (const cloud::Point& p : cloud) {
     const Eigen::Vector3f normal = p.getNormalVector3fMap();
     if (!normal.allFinite() || std::abs(normal.z()) > kWallUpright || p.z < floor_m + kFoot_m) continue;
-    samples.points.push_back(p.getVector3fMap() + file.shift.cast<float>());
+    samples.points.emplace_back(p.x, p.y, p.z - static_cast<float>(floor_m));
     samples.normals.push_back(normal);
   }
   return samples;
@@ -59,7 +61,7 @@ double typical_spacing(const evaluate::SurfaceSamples& samples) {
 }
 
 /// Height that walls reach and furniture does not.
-double wall_height(const evaluate::SurfaceSamples& samples, double floor_m) {
+double wall_height(const evaluate::SurfaceSamples& samples) {
   constexpr double kMost_m = 2.25;
   constexpr double kBelowTop_m = 0.3;
   if (samples.points.empty()) return kMost_m;
@@ -67,7 +69,7 @@ double wall_height(const evaluate::SurfaceSamples& samples, double floor_m) {
   for (const auto& p : samples.points) heights.push_back(p.z());
   const auto high = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() * 98 / 100);
   std::nth_element(heights.begin(), high, heights.end());
-  return std::min(kMost_m, static_cast<double>(*high) - floor_m - kBelowTop_m);
+  return std::min(kMost_m, static_cast<double>(*high) - kBelowTop_m);
 }
 
 /// The line on which most points lie: the most frequent distance, then least squares near it.
@@ -201,7 +203,7 @@ void align_with_points(const std::vector<Eigen::Vector3d>& points, WallLine& lin
 
 /// The walls on one plane.
 std::vector<Side> sides_on(const evaluate::SurfaceSamples& samples, const evaluate::WallPlane& plane,
-                           double floor_m, double need_m, double cut_m) {
+                           double need_m, double cut_m) {
   WallLine base;
   base.normal = plane.normal.head<2>().normalized();
   base.offset_m = plane.offset_m / plane.normal.head<2>().norm();
@@ -219,7 +221,7 @@ std::vector<Side> sides_on(const evaluate::SurfaceSamples& samples, const evalua
   });
 
   WallRaster raster(base.normal, base.offset_m, along.dot(own.front().head<2>()),
-                    along.dot(own.back().head<2>()), floor_m);
+                    along.dot(own.back().head<2>()), 0.0);
   for (const Eigen::Vector3d& p : own) raster.add_surface(p);
 
   std::vector<Side> sides;
@@ -262,9 +264,9 @@ bool covers(const WallLine& large, const WallLine& small) {
 
 }  // namespace
 
-void fit_sides(const cloud::CloudFile& file, double floor_m, const core::Executor& executor,
+void fit_sides(const cloud::Cloud& cloud, double floor_m, const core::Executor& executor,
                std::vector<WallLine>& walls) {
-  const evaluate::SurfaceSamples samples = upright_samples(file, floor_m);
+  const evaluate::SurfaceSamples samples = upright_samples(cloud, floor_m);
   executor.parallel_for(walls.size(), [&](std::size_t i) {
     WallLine& wall = walls[i];
     std::vector<Eigen::Vector2d> places;
@@ -280,10 +282,10 @@ void fit_sides(const cloud::CloudFile& file, double floor_m, const core::Executo
   });
 }
 
-std::vector<WallLine> wall_sides(const cloud::CloudFile& file, double floor_m, double cut_m,
+std::vector<WallLine> wall_sides(const cloud::Cloud& cloud, double floor_m, double cut_m,
                                  const core::Executor& executor) {
   constexpr int kMostPlanes = 80;
-  const evaluate::SurfaceSamples samples = upright_samples(file, floor_m);
+  const evaluate::SurfaceSamples samples = upright_samples(cloud, floor_m);
   evaluate::WallThicknessOptions patch_options;
   evaluate::WallPlanesOptions plane_options;
   plane_options.planes = kMostPlanes;
@@ -291,11 +293,10 @@ std::vector<WallLine> wall_sides(const cloud::CloudFile& file, double floor_m, d
   const auto planes =
       evaluate::wall_planes(samples, std::move(patches), patch_options.patch_m, plane_options);
 
-  const double need_m = wall_height(samples, floor_m);
+  const double need_m = wall_height(samples);
   std::vector<std::vector<Side>> found(planes.size());
   executor.parallel_for(planes.size(), [&](std::size_t i) {
-    if (std::abs(planes[i].normal.z()) < kWallUpright)
-      found[i] = sides_on(samples, planes[i], floor_m, need_m, cut_m);
+    if (std::abs(planes[i].normal.z()) < kWallUpright) found[i] = sides_on(samples, planes[i], need_m, cut_m);
   });
 
   std::vector<Side> sides;

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "plans/wall_steps.hpp"
@@ -15,7 +16,7 @@ namespace plumbline::exports {
 namespace {
 
 /// Surface and rays of walls, each from a little before its start to a little behind its end.
-std::vector<WallRaster> rasters_of(const std::vector<WallLine>& walls, const cloud::CloudFile& file,
+std::vector<WallRaster> rasters_of(const std::vector<WallLine>& walls, const cloud::Cloud& cloud,
                                    double floor_m) {
   constexpr double kSlab_m = 0.03;
   std::vector<WallRaster> rasters;
@@ -23,9 +24,9 @@ std::vector<WallRaster> rasters_of(const std::vector<WallLine>& walls, const clo
   for (const WallLine& wall : walls)
     rasters.emplace_back(wall.normal, wall.offset_m, wall.s0 - kWidestDoor_m, wall.s1 + kWidestDoor_m,
                          floor_m);
-  for (const cloud::Point& p : *file.cloud) {
+  for (const cloud::Point& p : cloud) {
     if (!(std::abs(p.normal_z) < 0.4F)) continue;
-    const Eigen::Vector3d at = p.getVector3fMap().cast<double>() + file.shift;
+    const Eigen::Vector3d at = p.getVector3fMap().cast<double>();
     for (std::size_t i = 0; i < walls.size(); ++i) {
       const double h = walls[i].normal.dot(at.head<2>()) - walls[i].offset_m;
       const double facing = walls[i].normal.x() * p.normal_x + walls[i].normal.y() * p.normal_y;
@@ -33,6 +34,43 @@ std::vector<WallRaster> rasters_of(const std::vector<WallLine>& walls, const clo
     }
   }
   return rasters;
+}
+
+core::Error no_wall_error(const MapSource& source, const cloud::CloudFile& file) {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (const cloud::Point& p : *file.cloud) {
+    low = std::min(low, file.shift.z() + static_cast<double>(p.z));
+    high = std::max(high, file.shift.z() + static_cast<double>(p.z));
+  }
+  const double floor_m = source.floor_m();
+  const double cut_m = source.options().cut_m;
+  const bool beside = floor_m + cut_m < low || floor_m + cut_m > high;
+  return {core::ErrorKind::kInput,
+          fmt::format(
+              "{}: no wall is seen at {:g} m over the floor, which is taken to be at {:g} m; points are at "
+              "heights of {:.2f} to {:.2f} m; {}choose another --cut",
+              source.request().input.string(), cut_m, floor_m, low, high,
+              beside && source.options().storey < 0 ? "find the floor with --storey 0, or " : "")};
+}
+
+/// Moves what was found in a cloud less its shift to where it is.
+void move_plan(const Eigen::Vector2d& shift, WallPlan& plan) {
+  for (WallLine& wall : plan.walls) {
+    const double along_m = wall.along().dot(shift);
+    wall.offset_m += wall.normal.dot(shift);
+    wall.s0 += along_m;
+    wall.s1 += along_m;
+    for (WallOpening& opening : wall.openings) opening = {opening.s0 + along_m, opening.s1 + along_m};
+  }
+  for (WallDoor& door : plan.doors) {
+    for (Eigen::Vector2d& jamb : door.jambs) jamb += shift;
+    for (Eigen::Vector2d& jamb : door.far_jambs) jamb += shift;
+  }
+  for (WallRoom& room : plan.rooms) {
+    for (Eigen::Vector2d& corner : room.outline) corner += shift;
+    room.label += shift;
+  }
 }
 
 }  // namespace
@@ -48,11 +86,13 @@ core::Result<WallPlan> find_walls(MapSource& source) {
         source.request().input.string()));
   }
 
-  const double floor_m = source.floor_m();
+  // Floats hold the points only less their shift, which a map with rays has not.
+  const double floor_m = source.floor_m() - (*cloud)->shift.z();
   const double cut_m = source.options().cut_m;
+  const cloud::Cloud& points = *(*cloud)->cloud;
   WallPlan plan;
-  plan.walls = wall_sides(**cloud, floor_m, cut_m, source.executor());
-  std::vector<WallRaster> rasters = rasters_of(plan.walls, **cloud, floor_m);
+  plan.walls = wall_sides(points, floor_m, cut_m, source.executor());
+  std::vector<WallRaster> rasters = rasters_of(plan.walls, points, floor_m);
   if (source.has_store()) {
     auto seen = for_each_view(source, [&](const ViewRays& rays) -> core::Result<void> {
       source.executor().parallel_for(rasters.size(), [&](std::size_t i) { rasters[i].add_rays(rays); });
@@ -64,10 +104,7 @@ core::Result<WallPlan> find_walls(MapSource& source) {
 
   drop_furniture(plan.walls, rasters, plan.rays_known);
   drop_loose_sides(plan.walls, rasters);
-  if (plan.walls.empty()) {
-    return core::input_error(fmt::format("{}: no wall is seen at {:g} m over the floor; choose another --cut",
-                                         source.request().input.string(), cut_m));
-  }
+  if (plan.walls.empty()) return tl::unexpected(no_wall_error(source, **cloud));
 
   join_corners(plan.walls);
   const Cut cut{std::max(0.25, cut_m - 0.3), cut_m + 0.3, plan.rays_known};
@@ -80,7 +117,7 @@ core::Result<WallPlan> find_walls(MapSource& source) {
     fronts.push_back({front, front});
   }
   bridge_gaps(plan.walls, fronts, cut);
-  fit_sides(**cloud, floor_m, source.executor(), plan.walls);
+  fit_sides(points, floor_m, source.executor(), plan.walls);
   join_corners(plan.walls);
   meet_hidden_walls(plan.walls);
 
@@ -93,6 +130,7 @@ core::Result<WallPlan> find_walls(MapSource& source) {
   const std::vector<WallDoor> more = doors_between_sides(plan.walls, fronts, cut);
   plan.doors.insert(plan.doors.end(), more.begin(), more.end());
   plan.rooms = rooms_of(plan.walls);
+  move_plan((*cloud)->shift.head<2>(), plan);
   return plan;
 }
 

@@ -61,10 +61,10 @@ core::Result<WallPlan> find_walls(MapSource& source);
 // Steps of it.
 
 /// Sides of walls that the cloud shows, without openings and corners; tall furniture is among them.
-std::vector<WallLine> wall_sides(const cloud::CloudFile& file, double floor_m, double cut_m,
+std::vector<WallLine> wall_sides(const cloud::Cloud& cloud, double floor_m, double cut_m,
                                  const core::Executor& executor);
 /// Fits each line again to all points of the cloud between its ends.
-void fit_sides(const cloud::CloudFile& file, double floor_m, const core::Executor& executor,
+void fit_sides(const cloud::Cloud& cloud, double floor_m, const core::Executor& executor,
                std::vector<WallLine>& walls);
 /// Lets ends meet where lines cross.
 void join_corners(std::vector<WallLine>& walls);

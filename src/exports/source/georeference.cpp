@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <system_error>
 
 #include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/core/output_file.hpp"
@@ -47,6 +48,11 @@ core::Result<void> place_by_origin(const ExportOptions& options, const ProjFunct
   return proj.describe(options.epsg, reference);
 }
 
+std::filesystem::path georeference_file(std::filesystem::path file) {
+  file += ".georeference.json";
+  return file;
+}
+
 }  // namespace
 
 Eigen::Matrix3d Georeference::linear() const {
@@ -55,7 +61,7 @@ Eigen::Matrix3d Georeference::linear() const {
   return turned;
 }
 
-core::Result<std::optional<Georeference>> georeference_of(const ExportOptions& options) {
+core::Result<std::optional<Georeference>> georeference_of(const ExportOptions& options, core::Log& log) {
   const bool by_origin = options.epsg != 0 || !options.origin.empty();
   if (options.datum.empty() && !by_origin) return std::nullopt;
   if (!options.datum.empty() && by_origin)
@@ -67,6 +73,11 @@ core::Result<std::optional<Georeference>> georeference_of(const ExportOptions& o
   auto placed = by_origin ? place_by_origin(options, **proj, reference)
                           : place_by_datum(options.datum, **proj, reference);
   if (!placed) return tl::unexpected(placed.error());
+  if (by_origin && !(*proj)->covers(reference)) {
+    log.warning(fmt::format(
+        "--origin {:.0f},{:.0f}: lies outside the area of use of EPSG:{} ({}); east comes first, then north",
+        reference.origin.x(), reference.origin.y(), reference.epsg, reference.name));
+  }
   return reference;
 }
 
@@ -102,9 +113,12 @@ core::Result<void> write_georeference(const std::filesystem::path& file, const G
     json["linear"].push_back({linear(row, 0), linear(row, 1), linear(row, 2)});
 
   json["wkt"] = reference.wkt;
-  std::filesystem::path beside = file;
-  beside += ".georeference.json";
-  return core::write_file(beside, json.dump(2) + "\n");
+  return core::write_file(georeference_file(file), json.dump(2) + "\n");
+}
+
+void remove_georeference(const std::filesystem::path& file) {
+  std::error_code ignored;
+  std::filesystem::remove(georeference_file(file), ignored);
 }
 
 }  // namespace plumbline::exports

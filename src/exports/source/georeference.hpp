@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "plumbline/core/log.hpp"
 #include "plumbline/core/part.hpp"
 #include "plumbline/exports/options.hpp"
 
@@ -38,14 +39,19 @@ struct ProjFunctions {
   /// Origin, turn and scale of a map whose origin is at (latitude, longitude) and whose x axis has this
   /// heading, all degrees. Errors (kUsage): the system does not cover it.
   core::Result<void> (*place)(double latitude, double longitude, double heading, Georeference& reference);
+  /// True if the origin lies in the system's area of use, give or take 3 degrees, or that is not known.
+  bool (*covers)(const Georeference& reference);
 };
 
-/// Georeference requested by --datum, or by --epsg with --origin; none if neither was given. Errors (kUsage).
-core::Result<std::optional<Georeference>> georeference_of(const ExportOptions& options);
+/// Georeference requested by --datum, or by --epsg with --origin; none if neither was given. Warns about an
+/// origin outside of the system. Errors (kUsage).
+core::Result<std::optional<Georeference>> georeference_of(const ExportOptions& options, core::Log& log);
 
 /// The cloud in world coordinates, whose large part becomes the cloud's shift.
 cloud::CloudFile to_world(const cloud::CloudFile& file, const Georeference& reference);
 /// Writes FILE.georeference.json: the transform that was applied.
 core::Result<void> write_georeference(const std::filesystem::path& file, const Georeference& reference);
+/// Removes the one that an earlier export left beside the file, which it no longer fits.
+void remove_georeference(const std::filesystem::path& file);
 
 }  // namespace plumbline::exports

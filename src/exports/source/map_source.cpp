@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <iterator>
 #include <limits>
@@ -31,7 +32,7 @@ bool is_cloud_file(const fs::path& input) {
   std::error_code ec;
   return !fs::is_directory(input, ec) &&
          std::any_of(kEndings.begin(), kEndings.end(),
-                     [&](const char* ending) { return input.extension() == ending; });
+                     [&](const char* ending) { return lower(input.extension().string()) == ending; });
 }
 
 Eigen::Vector3d position_of(const cloud::Point& point, const cloud::CloudFile& file) {
@@ -55,8 +56,12 @@ std::optional<maps::MapPlace> find_component(const fs::path& input) {
 }
 
 /// Why nothing is left to be written.
-const char* cause_of_nothing(const ExportOptions& options) {
+std::string cause_of_nothing(const ExportOptions& options) {
   const bool whole = options.box.empty() && options.z.empty() && options.storey < 0;
+  if (options.voxel_m > 0.0) {
+    return fmt::format("--voxel is {:g} m; choose a smaller one{}", options.voxel_m,
+                       whole ? "" : ", or a larger --box, --z or --storey");
+  }
   return whole ? "the map is empty" : "choose a larger --box, --z or --storey";
 }
 
@@ -93,6 +98,12 @@ geometry::Rigid3 upright_from_map(const cloud::Floor& floor, const geometry::Rig
 }
 
 }  // namespace
+
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
 
 std::vector<double> floor_heights(const cloud::Cloud& cloud) {
   constexpr double kBin_m = 0.05;
@@ -221,7 +232,8 @@ core::Result<void> MapSource::select() {
   const auto cloud = whole_cloud();
   if (!cloud) return tl::unexpected(cloud.error());
 
-  const std::vector<double> floors = floor_heights(*(*cloud)->cloud);
+  std::vector<double> floors = floor_heights(*(*cloud)->cloud);
+  for (double& floor : floors) floor += (*cloud)->shift.z();
   const auto wanted = static_cast<std::size_t>(o.storey);
   if (wanted >= floors.size()) {
     return core::usage_error(fmt::format("--storey {}: {} floor{} seen; 0 is the lowest", o.storey,
@@ -255,7 +267,8 @@ core::Result<const maps::StoredRun*> MapSource::store(const std::string& what) c
                                          request_->output.string(), request_->input.string(), what));
   }
   return core::input_error(
-      fmt::format("{}: {} has no map.db, which holds {}; map the recording again without store.enabled=off",
+      fmt::format("{}: {} has no map.db, which holds {}; map the recording again with a pipeline that tracks "
+                  "(known_poses keeps none) and without store.enabled=off",
                   request_->output.string(), request_->input.string(), what));
 }
 

@@ -14,8 +14,9 @@
 namespace plumbline::exports {
 namespace {
 
-/// Recordings from which the map was made, by robot; empty if the map was fused from other maps.
-std::vector<RecordingName> recordings_of_run(const std::string& configuration) {
+/// Recordings from which the map in `folder` was made, by robot; empty if the map was fused from other maps.
+std::vector<RecordingName> recordings_of_run(const std::string& configuration,
+                                             const std::filesystem::path& folder) {
   const auto root = core::parse_yaml(configuration, "configuration");
   const core::ConfigNode* run = root ? root->find("run") : nullptr;
   if (run == nullptr) return {};
@@ -23,18 +24,27 @@ std::vector<RecordingName> recordings_of_run(const std::string& configuration) {
     const core::ConfigNode* node = run->find(key);
     return node != nullptr ? node->scalar : std::string();
   };
+
+  // Relative paths are seen from where the map was made, if something is there.
+  const std::filesystem::path base = folder / text("folder");
+  const auto found = [&](const std::string& path) {
+    std::error_code ec;
+    return !path.empty() && std::filesystem::exists(base / path, ec) ? (base / path).string() : path;
+  };
+
   std::vector<RecordingName> names;
   for (std::size_t i = 1;; ++i) {
     const std::string input = text(i == 1 ? "input" : fmt::format("input{}", i));
     if (input.empty()) return names;
-    names.push_back({input, text("camera"), text("format")});
+    names.push_back({found(input), found(text("camera")), text("format")});
   }
 }
 
 core::Result<std::vector<RecordingName>> recordings_of(const MapSource& source,
-                                                       const maps::StoreHeader& header) {
+                                                       const maps::StoredRun& store) {
+  const maps::StoreHeader& header = store.stored().header;
   const std::size_t robots = header.robots.size();
-  std::vector<RecordingName> names = recordings_of_run(header.configuration);
+  std::vector<RecordingName> names = recordings_of_run(header.configuration, store.file().parent_path());
   const std::vector<std::string>& given = source.request().recordings;
   if (given.empty() && names.size() == robots) return names;
 
@@ -156,7 +166,7 @@ core::Result<Pictures> Pictures::open_recordings(const MapSource& source) {
   if (!source.request().open)
     return core::input_error("recordings cannot be opened here; pictures are left out");
 
-  const auto names = recordings_of(source, header);
+  const auto names = recordings_of(source, **store);
   if (!names) return tl::unexpected(names.error());
 
   Pictures pictures;
@@ -209,7 +219,8 @@ core::Result<sensor::RgbdFrame> Pictures::read(std::int32_t robot, std::size_t f
 std::unique_ptr<Pictures> open_pictures(const MapSource& source, ExportSummary& summary) {
   auto pictures = Pictures::open(source);
   if (pictures) return std::make_unique<Pictures>(std::move(*pictures));
-  const bool named = !source.request().recordings.empty();
+  const bool named = !source.request().recordings.empty() ||
+                     pictures.error().message.find("--recording") != std::string::npos;
   summary.notes.push_back("poses only, without pictures: " + pictures.error().message +
                           (named ? "" : "; if the recording lies elsewhere now, name it with --recording"));
   return nullptr;
@@ -259,6 +270,13 @@ core::Result<std::vector<Picture>> pictures_of(const MapSource& source, const Pi
   }
 
   return all;
+}
+
+std::string pictures_text(const std::vector<Picture>& pictures) {
+  const auto written = std::count_if(pictures.begin(), pictures.end(),
+                                     [](const Picture& picture) { return picture.frame.has_value(); });
+  if (static_cast<std::size_t>(written) == pictures.size()) return fmt::format("{} pictures", written);
+  return fmt::format("{} poses, {} pictures", pictures.size(), written);
 }
 
 }  // namespace plumbline::exports

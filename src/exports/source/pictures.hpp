@@ -52,6 +52,9 @@ struct Picture {
 /// the sharpest frame near each keyframe. `pictures` may be null. In order, numbered from 1.
 core::Result<std::vector<Picture>> pictures_of(const MapSource& source, const Pictures* pictures);
 
+/// "17 pictures", or "17 poses, 3 pictures" where some have none.
+std::string pictures_text(const std::vector<Picture>& pictures);
+
 /// The recordings, or null with a note that says why.
 std::unique_ptr<Pictures> open_pictures(const MapSource& source, ExportSummary& summary);
 

@@ -293,15 +293,17 @@ core::Result<void> revoke(const fs::path& folder, const std::vector<std::string>
 }
 
 core::Result<int> days_left(const fs::path& folder) {
-  int days = 0;
+  int days = 0;  // towards 0: none on the first day after the certificate expired
+  bool past = false;
   const auto read = guarded(core::ErrorKind::kUsage, [&] {
     const Certificate certificate = read_certificate(folder / kCertificateFile);
     int seconds = 0;
     demand(ASN1_TIME_diff(&days, &seconds, nullptr, X509_get0_notAfter(certificate.get())) == 1,
            (folder / kCertificateFile).string() + ": is damaged");
+    past = seconds < 0;
   });
   if (!read) return core::usage_error("--security: " + read.error().message);
-  return days;
+  return past ? days - 1 : days;
 }
 
 }  // namespace plumbline::net

@@ -23,7 +23,8 @@ constexpr const char* kGovernanceFile = "governance.p7s";
 constexpr const char* kPermissionsFile = "permissions.p7s";
 constexpr const char* kRevokedFile = "crl.pem";
 
-/// Days until the certificate in a folder of keys expires. Errors (kUsage): it cannot be read.
+/// Days until the certificate in a folder of keys expires; negative: it has expired. Errors (kUsage): it
+/// cannot be read.
 core::Result<int> days_left(const std::filesystem::path& folder);
 
 }  // namespace plumbline::net

@@ -292,8 +292,7 @@ core::Result<void*> start(PageServerOptions& options, std::string page) {
                                                                               : -1;
   if (port <= 0) {
     return core::usage_error(
-        fmt::format("--http {}:{}: cannot listen there; is the port in use? Choose another one", options.host,
-                    options.port));
+        fmt::format("--http {}:{}: cannot listen there; choose another port", options.host, options.port));
   }
 
   options.port = running->port = port;

@@ -2,9 +2,14 @@
 #include "plumbline/net/page_server.hpp"
 
 #include <fmt/format.h>
+#include <netdb.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
+#include <cerrno>
+#include <cstring>
 #include <utility>
 
 #include "http/http_functions.hpp"
@@ -15,6 +20,30 @@ namespace {
 bool all_digits(const std::string& text) {
   return !text.empty() &&
          std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
+/// 0, or why the system does not let a server have the address.
+int bind_problem(const addrinfo& address) {
+  const int descriptor = ::socket(address.ai_family, address.ai_socktype | SOCK_CLOEXEC, address.ai_protocol);
+  if (descriptor < 0) return errno;
+  const int yes = 1;
+  ::setsockopt(descriptor, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
+  const int problem = ::bind(descriptor, address.ai_addr, address.ai_addrlen) == 0 ? 0 : errno;
+  ::close(descriptor);
+  return problem;
+}
+
+std::string problem_text(int problem, const PageServerOptions& options) {
+  switch (problem) {
+    case EADDRINUSE:
+      return fmt::format("port {} is in use; choose another one", options.port);
+    case EADDRNOTAVAIL:
+      return fmt::format("{} is not an address of this machine; 0.0.0.0 stands for all it has", options.host);
+    case EACCES:
+      return fmt::format("port {} is kept for the system; choose one from 1024 on", options.port);
+    default:
+      return fmt::format("cannot listen there ({})", std::strerror(problem));
+  }
 }
 
 }  // namespace
@@ -37,7 +66,31 @@ core::Result<PageServerOptions> page_server_options(const std::string& address, 
   return options;
 }
 
+core::Result<void> check_listening(const PageServerOptions& options) {
+  addrinfo wanted{};
+  wanted.ai_family = AF_UNSPEC;
+  wanted.ai_socktype = SOCK_STREAM;
+  wanted.ai_flags = AI_PASSIVE;
+  addrinfo* found = nullptr;
+  if (::getaddrinfo(options.host.c_str(), std::to_string(options.port).c_str(), &wanted, &found) != 0) {
+    return core::usage_error(
+        fmt::format("--http {0}:{1}: there is no host {0}; write HOST:PORT, such as 127.0.0.1:8080",
+                    options.host, options.port));
+  }
+
+  int problem = 0;
+  for (const addrinfo* address = found; address != nullptr; address = address->ai_next) {
+    problem = bind_problem(*address);
+    if (problem == 0) break;
+  }
+  ::freeaddrinfo(found);
+  if (problem == 0) return {};
+  return core::usage_error(
+      fmt::format("--http {}:{}: {}", options.host, options.port, problem_text(problem, options)));
+}
+
 core::Result<PageServer> PageServer::start(const PageServerOptions& options, std::string page) {
+  if (auto free = check_listening(options); !free) return tl::unexpected(free.error());
   const auto& http = core::part<HttpFunctions>();
   if (!http) return tl::unexpected(http.error());
   PageServer server;

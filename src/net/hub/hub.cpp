@@ -4,6 +4,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <ctime>
 #include <fstream>
 #include <mutex>
@@ -15,6 +16,7 @@
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/core/side_thread.hpp"
 #include "plumbline/maps/output_folder.hpp"
+#include "plumbline/maps/stored_maps.hpp"
 
 namespace plumbline::net {
 namespace {
@@ -87,31 +89,40 @@ core::Result<void> add_network(const fs::path& file, const std::vector<RobotTraf
   return core::write_file(file, summary.dump(2) + "\n");
 }
 
-/// Folders of the maps that can be fused; `reason` names the others.
-std::vector<fs::path> usable_maps(const fs::path& folder, const HubServer::Collected& collected,
-                                  std::size_t expected, core::Log& log, std::string& reason) {
+void add_reason(const std::string& why, std::string& reason) { reason += (reason.empty() ? "" : "; ") + why; }
+
+/// Folders of the maps that were received; `reason` names what is missing.
+std::vector<fs::path> received_maps(const fs::path& folder, const HubServer::Collected& collected,
+                                    std::size_t expected, std::string& reason) {
   std::vector<fs::path> maps;
-  const auto leave_out = [&](const std::string& why) { reason += (reason.empty() ? "" : "; ") + why; };
   for (const RobotTraffic& t : collected.traffic) {
-    if (!t.done) leave_out(fmt::format("{} has not sent everything", t.name));
-    if (t.keyframes == 0) continue;
-
-    // A damaged map must not keep the others from being fused.
-    const auto damaged = collected.damaged.find(t.name);
-    if (damaged == collected.damaged.end()) {
-      maps.push_back(folder / "robots" / t.name);
-      continue;
-    }
-
-    log.warning(fmt::format("{} is left out: {}", t.name, damaged->second));
-    leave_out(t.name + " is left out: its map does not load");
+    if (!t.done) add_reason(fmt::format("{} has not sent everything", t.name), reason);
+    if (t.keyframes > 0) maps.push_back(folder / "robots" / t.name);
   }
 
   if (const std::size_t came = collected.traffic.size(); came < expected) {
-    leave_out(fmt::format("{} of {} robots did not connect", expected - came, expected));
+    add_reason(fmt::format("{} of {} robots did not connect", expected - came, expected), reason);
   }
 
   return maps;
+}
+
+/// Removes maps that do not load from `maps`, and adds them to `reason`; false: all of them load.
+bool leave_out_damaged(std::vector<fs::path>& maps, const core::Executor& executor, core::Log& log,
+                       std::string& reason) {
+  const auto is_damaged = [&](const fs::path& map) {
+    const auto opened = maps::StoredMaps::open({map}, executor);
+    if (opened) return false;
+    const std::string name = map.filename().string();
+    log.warning(fmt::format("{} is left out: {}", name, opened.error().message));
+    add_reason(name + " is left out: its map does not load", reason);
+    return true;
+  };
+
+  const auto kept = std::remove_if(maps.begin(), maps.end(), is_damaged);
+  if (kept == maps.end()) return false;
+  maps.erase(kept, maps.end());
+  return true;
 }
 
 /// Only the hub learns why a participant with foreign keys gets nothing: lines on certificates become
@@ -132,17 +143,22 @@ core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, con
                                                   core::Log& log, const pipeline::Progress& progress) {
   std::string reason;
   pipeline::FuseRequest last = request.fuse;
-  last.maps = usable_maps(folder, collected, request.robots, log, reason);
-  if (last.maps.empty()) {
+  last.maps = received_maps(folder, collected, request.robots, reason);
+  last.output = folder / "fused";
+  last.replace = true;
+  const auto fuse = [&]() -> core::Result<pipeline::RunSummary> {
+    if (!last.maps.empty()) {
+      return pipeline::fuse_stored_maps(last, executor, log, core::StopToken(), progress);
+    }
     return core::failure(
         core::ErrorKind::kUntrustworthy,
         fmt::format("no map was received that could be fused{}; received data are in {}, --resume continues",
                     reason.empty() ? "" : " (" + reason + ")", folder.string()));
-  }
+  };
 
-  last.output = folder / "fused";
-  last.replace = true;
-  auto summary = pipeline::fuse_stored_maps(last, executor, log, core::StopToken(), progress);
+  // A damaged map must not keep the others from being fused.
+  auto summary = fuse();
+  if (!summary && leave_out_damaged(last.maps, executor, log, reason)) summary = fuse();
   if (!summary) return tl::unexpected(summary.error());
 
   if (!summary->reason.empty()) reason = summary->reason + (reason.empty() ? "" : "; " + reason);

@@ -329,7 +329,6 @@ HubServer::Collected HubServer::close() {
   Collected collected;
   for (const auto& [name, session] : robots_) {
     collected.traffic.push_back(session.traffic());
-    if (const auto map = session.copy().map().map(); !map) collected.damaged[name] = map.error().message;
     if (session.done) collected.final_statuses.push_back(status_of(session));
   }
   robots_.clear();

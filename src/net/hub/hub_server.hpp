@@ -34,9 +34,8 @@ class HubServer {
   /// Serves until all expected robots are done, or `stop` is requested.
   void serve(const core::StopToken& stop, const Status& status);
   struct Collected {
-    std::vector<RobotTraffic> traffic;           ///< by name
-    std::vector<HubStatus> final_statuses;       ///< for robots that delivered everything
-    std::map<std::string, std::string> damaged;  ///< why a robot's rows make no map, by name
+    std::vector<RobotTraffic> traffic;      ///< by name
+    std::vector<HubStatus> final_statuses;  ///< for robots that delivered everything
   };
   /// Closes the copies after serve().
   Collected close();

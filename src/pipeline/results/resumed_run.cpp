@@ -28,8 +28,8 @@ void flatten(const core::ConfigNode& node, const std::string& path, Values& valu
 /// True for settings that change neither the map nor its files: names, and inputs that are compared by
 /// content.
 bool of_no_matter(const std::string& path) {
-  for (const char* key :
-       {"run.input", "run.pipeline", "run.camera", "run.format", "run.threads", "description"}) {
+  for (const char* key : {"run.input", "run.folder", "run.pipeline", "run.camera", "run.format",
+                          "run.threads", "description"}) {
     if (path == key) return true;
   }
   return false;

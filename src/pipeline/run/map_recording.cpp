@@ -28,6 +28,21 @@
 namespace plumbline::pipeline {
 namespace {
 
+/// The current folder as seen from the result, for whoever looks for the recordings from another one; "":
+/// none has a relative path.
+std::string folder_from_result(const MapRequest& request) {
+  std::error_code ec;
+  const auto is_relative = [&](const std::string& input) {
+    return std::filesystem::path(input).is_relative() && std::filesystem::exists(input, ec);
+  };
+  if (!is_relative(request.input) &&
+      std::none_of(request.others.begin(), request.others.end(), is_relative)) {
+    return "";
+  }
+  const std::filesystem::path result = std::filesystem::absolute(request.output, ec);
+  return std::filesystem::relative(std::filesystem::current_path(ec), result, ec).string();
+}
+
 /// The effective configuration: a pipeline file that gives the same result again, and how it was run;
 /// `threads` 0: left out.
 std::string config_text(const MapRequest& request, const Graph& graph, int threads) {
@@ -36,6 +51,10 @@ std::string config_text(const MapRequest& request, const Graph& graph, int threa
       core::version());
   text += "run:\n";
   text += fmt::format("  input: {}\n  pipeline: {}\n", quoted(request.input), quoted(request.pipeline));
+
+  if (const std::string folder = folder_from_result(request); !folder.empty()) {
+    text += fmt::format("  folder: {}  # in which the program was run, seen from this one\n", quoted(folder));
+  }
 
   for (std::size_t i = 0; i < request.others.size(); ++i) {
     text += fmt::format("  input{}: {}\n", i + 2, quoted(request.others[i]));
@@ -58,6 +77,7 @@ std::string config_text(const MapRequest& request, const Graph& graph, int threa
     if (!topic.empty()) text += fmt::format("  topic_{}: {}\n", what, quoted(topic));
   }
 
+  if (request.live != nullptr) text += "  fed: on\n";
   if (request.feedback != nullptr) text += "  feedback: on\n";
   if (request.open.poses == dataset::PoseUse::kIgnore) text += "  poses: ignore\n";
   if (threads > 0) text += fmt::format("  threads: {}\n", threads);
@@ -82,8 +102,9 @@ std::string input_text(const RobotRecordings& source) {
   return text;
 }
 
-/// The same request for any order of its recordings: sorted by name, and by folder for equal names.
-MapRequest in_order(MapRequest request) {
+/// The same request for any order of its recordings: sorted by name, and by folder for equal names. Error
+/// (kUsage): one is given twice.
+core::Result<MapRequest> in_order(MapRequest request) {
   if (request.others.empty()) return request;
   struct Input {
     std::string name;
@@ -102,6 +123,13 @@ MapRequest in_order(MapRequest request) {
   std::sort(inputs.begin(), inputs.end(), [](const Input& a, const Input& b) {
     return std::tie(a.name, a.folder, a.given) < std::tie(b.name, b.folder, b.given);
   });
+
+  const auto place = [](const Input& input) {
+    return std::filesystem::absolute(input.given).lexically_normal();
+  };
+  const auto twice = std::adjacent_find(inputs.begin(), inputs.end(),
+                                        [&](const Input& a, const Input& b) { return place(a) == place(b); });
+  if (twice != inputs.end()) return core::usage_error(fmt::format("{}: is given twice", twice->given));
 
   request.input = inputs.front().given;
   for (std::size_t i = 1; i < inputs.size(); ++i) request.others[i - 1] = inputs[i].given;
@@ -334,8 +362,9 @@ core::Result<RunSummary> map_recording(const MapRequest& given, const core::Exec
                                        core::Log& log, const core::StopToken& stop,
                                        const Progress& progress) {
   const auto began = RunClock::now();
-  const MapRequest request = in_order(given);
-  MapRun run(request, executor, log);
+  const auto request = in_order(given);
+  if (!request) return tl::unexpected(request.error());
+  MapRun run(*request, executor, log);
   if (auto opened = run.open(); !opened) return tl::unexpected(opened.error());
   return run.run(stop, progress, began);
 }

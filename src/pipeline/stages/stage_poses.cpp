@@ -39,6 +39,7 @@ class PosesStage : public Stage {
     for (const RobotInfo& robot : recordings_->robots()) {
       auto poses = poses_of(robot);
       if (!poses) return tl::unexpected(poses.error());
+      if (auto near = near_origin(file_of(robot), *poses); !near) return near;
       ways_[static_cast<std::size_t>(robot.number)].poses = std::move(*poses);
     }
     return {};
@@ -107,18 +108,35 @@ class PosesStage : public Stage {
   };
   [[nodiscard]] bool several() const { return ways_.size() > 1; }
 
-  [[nodiscard]] core::Result<geometry::Trajectory> poses_of(const RobotInfo& robot) const {
-    if (!file_.empty()) {
-      std::string file = file_;
-      if (const auto at = file.find(kRobot); at != std::string::npos) {
-        file.replace(at, std::string(kRobot).size(), robot.name);
-      }
-      return dataset::read_trajectory(file);
+  /// The robot's file of poses; its recording, if they are that one's own.
+  [[nodiscard]] std::string file_of(const RobotInfo& robot) const {
+    std::string file = file_.empty() ? robot.name : file_;
+    if (const auto at = file.find(kRobot); at != std::string::npos) {
+      file.replace(at, std::string(kRobot).size(), robot.name);
     }
+    return file;
+  }
+  [[nodiscard]] core::Result<geometry::Trajectory> poses_of(const RobotInfo& robot) const {
+    if (!file_.empty()) return dataset::read_trajectory(file_of(robot));
     const auto truth = recordings_->truth_of(robot.number);
     if (truth && !truth->empty()) return *truth;
     return core::input_error(fmt::format(
         "{}: the recording has no poses of its own; name a file with --set poses.file=FILE", robot.name));
+  }
+  /// Floats hold a millimetre, and the map voxels of 1 cm, up to 2^20 cm from the origin.
+  [[nodiscard]] static core::Result<void> near_origin(const std::string& file,
+                                                      const geometry::Trajectory& poses) {
+    constexpr double kFarthest_m = 10400.0;
+    for (const geometry::StampedPose& pose : poses) {
+      const Eigen::Vector3d& at = pose.world_from_camera.translation;
+      if (at.cwiseAbs().maxCoeff() <= kFarthest_m) continue;
+      return core::input_error(fmt::format(
+          "{}: the pose at {:.6f} s lies at {:.0f} {:.0f} {:.0f} m, and clouds hold a millimetre only within "
+          "about 10 km of the origin; subtract an offset from all poses, and let export add it again with "
+          "--epsg and --origin",
+          file, pose.stamp, at.x(), at.y(), at.z()));
+    }
+    return {};
   }
   /// Motion between the stamps of both images; identity if no pose is near the stamp of the depth image.
   [[nodiscard]] geometry::Rigid3 depth_from_camera(const geometry::Trajectory& poses,

@@ -53,13 +53,15 @@ evaluate::SurfaceSamples samples_of(const Doubles& points, const std::optional<D
   return samples;
 }
 
-/// JSON, and the error of each point, metres (empty without a reference).
-py::tuple evaluate_cloud(const Doubles& points, const std::optional<Doubles>& normals,
-                         const fs::path& reference, const std::vector<std::pair<fs::path, fs::path>>& paths,
-                         const OptionValues& values, int threads) {
+/// JSON, and the error of each point, metres (empty without a reference). The points are less `shift`.
+py::tuple evaluate_cloud(const Doubles& points, const std::array<double, 3>& shift,
+                         const std::optional<Doubles>& normals, const fs::path& reference,
+                         const std::vector<std::pair<fs::path, fs::path>>& paths, const OptionValues& values,
+                         int threads) {
   evaluate::CloudOptions options;
   set_options(options, values, "evaluate_cloud");
-  const evaluate::SurfaceSamples samples = samples_of(points, normals);
+  evaluate::SurfaceSamples samples = samples_of(points, normals);
+  samples.shift = {shift[0], shift[1], shift[2]};
   evaluate::CloudReport report;
 
   {
@@ -155,8 +157,8 @@ py::array render(const fs::path& input, const std::string& title, bool lines, co
 void add_measures(py::module_& module) {
   module.def("evaluate_trajectory", &evaluate_trajectory, py::arg("stamps"), py::arg("poses"),
              py::arg("true_stamps"), py::arg("true_poses"), py::arg("options"));
-  module.def("evaluate_cloud", &evaluate_cloud, py::arg("points"), py::arg("normals"), py::arg("reference"),
-             py::arg("paths"), py::arg("options"), py::arg("threads"));
+  module.def("evaluate_cloud", &evaluate_cloud, py::arg("points"), py::arg("shift"), py::arg("normals"),
+             py::arg("reference"), py::arg("paths"), py::arg("options"), py::arg("threads"));
   module.def("write_export", &write_export, py::arg("input"), py::arg("output"), py::arg("format"),
              py::arg("what"), py::arg("options"), py::arg("pipelines"), py::arg("replace"),
              py::arg("threads"));

@@ -197,7 +197,8 @@ def evaluate_trajectory(
     options: Dict[str, str],
 ) -> Tuple[str, npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...
 def evaluate_cloud(
-    points: npt.NDArray[np.float64],
+    points: npt.NDArray[Any],
+    shift: List[float],
     normals: Optional[npt.NDArray[Any]],
     reference: str,
     paths: List[Tuple[str, str]],

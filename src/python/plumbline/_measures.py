@@ -76,8 +76,9 @@ def evaluate_cloud(
     if os.path.isdir(surface):
         surface = os.path.join(surface, "reference.ply")
     pairs = [(os.fspath(a), os.fspath(b)) for a, b in paths or []]
-    points = measured.points.astype(np.float64) + measured.shift
-    text, errors = _core.evaluate_cloud(points, measured.normals, surface, pairs, option_texts(options), threads)
+    text, errors = _core.evaluate_cloud(
+        measured.points, measured.shift.tolist(), measured.normals, surface, pairs, option_texts(options), threads
+    )
     report = Report(json.loads(text))
     report.stamps, report.errors = np.empty(0), errors
     return report

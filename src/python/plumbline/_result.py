@@ -177,7 +177,8 @@ class Result:
     def image(self, frame: int, robot: str = "") -> Frame:
         """A frame of the mapped recording, by its number in Keyframes and Landmarks; `robot`: one of several.
 
-        Raises InputError if the recording is no longer at its place, or if the result was fused from other maps.
+        Raises InputError if the recording is no longer at its place, if the result was fused from other maps or its
+        frames were fed, or if `robot` is none of several.
         """
         return self._recording(robot)[frame]
 
@@ -185,13 +186,21 @@ class Result:
         if robot in self._recordings:
             return self._recordings[robot]
 
+        known = [folder.name for folder in self._robot_folders]
+        if len(known) > 1 and robot not in known:
+            raise _core.InputError(f"{self.folder}: no robot {robot!r}; give one of them: {', '.join(known)}")
+
         names = [str(entry["name"]) for entry in self.summary.get("robots", [])]
         number = names.index(robot) + 1 if robot in names else 1
         run = _core.run_settings(self.folder / "config.yaml")
         recording = run.get("input" if number == 1 else f"input{number}", "")
+        if "fed" in run:
+            raise _core.InputError(f"{self.folder}: was made of frames that were fed; there is no recording of them")
         if not recording:
             raise _core.InputError(f"{self.folder}: does not say which recording it was made from; open that one instead")
 
+        here = self.folder / run.get("folder", "") / recording
+        recording = os.fspath(here) if here.exists() else recording
         topics = {key[len("topic_"):]: value for key, value in run.items() if key.startswith("topic_")}
         self._recordings[robot] = open_recording(
             recording, camera=run["camera"], format=run["format"], start=_seconds(run["from"]),

@@ -225,6 +225,10 @@ class Mapper:
         Raises InputError: another dtype, shape or size than the camera's, not contiguous, NaN everywhere, a stamp that is
         not later. The frame is then skipped, and others can be fed. Errors of the run itself are raised here, too.
         """
+        if not isinstance(color, np.ndarray) or not isinstance(depth, np.ndarray) or np.ndim(stamp) > 0:
+            kinds = ", ".join(type(given).__name__ for given in (color, depth, stamp))
+            raise TypeError(f"feed(color, depth, stamp) takes two arrays and a number of seconds, not {kinds}")
+
         self._check()
         while not self._run.wait_for_room(self._queue, 0.0 if self._drop_late else _LOOK_UP):
             self._check()

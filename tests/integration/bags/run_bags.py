@@ -180,7 +180,7 @@ def processor_time():
     return used.ru_utime + used.ru_stime
 
 
-def mutations(test, count=1000, budget_s=400):
+def mutations(test, count=500, budget_s=400):
     """Any byte of small bags changed, taken out or doubled; 2 GB of memory, 10 s of a processor."""
     rng = random.Random(1)
     corpus = sorted((HERE.parents[1] / "fuzz/corpus/bag").iterdir())

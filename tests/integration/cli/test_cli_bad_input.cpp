@@ -34,6 +34,13 @@ TEST_F(BadInput, ListNamesFilesThatAreNotThere) {
   expect_refused(run(kMap), 3, {"rgb"});
 }
 
+TEST_F(BadInput, PosesFarFromTheOriginAreRefused) {
+  write_wall(path("wall"));
+  write("far.txt", "1 0 0 0 0 0 0 1\n2 691000 5334000 520 0 0 0 1\n");
+  expect_refused(run(std::string(kMap) + "--set poses.file=far.txt"), 3,
+                 {"far.txt", "the pose at 2.000000 s lies at 691000 5334000 520 m", "subtract an offset"});
+}
+
 TEST_F(BadInput, OneTruncatedPictureIsSkipped) {
   write_wall(path("wall"));
   truncate("wall/rgb/005.png");

@@ -90,6 +90,56 @@ TEST_F(CliBags, AnEarlierCopyIsReplacedOnlyWhenAskedFor) {
   EXPECT_EQ(again.code, 2) << again;
   EXPECT_TRUE(again.told("--force")) << again;
   EXPECT_EQ(run("convert wall copy -q --force").code, 0);
+  ASSERT_EQ(run("convert wall copy.mcap -q").code, 0);
+  EXPECT_EQ(run("convert wall copy.mcap -q").code, 2);
+  EXPECT_EQ(run("convert wall copy.mcap -q --force").code, 0);
+  fs::create_directory(path("empty"));
+  EXPECT_EQ(run("convert wall empty -q").code, 0);
+}
+
+TEST_F(CliBags, NoRecordingIsReplacedByACopy) {
+  write_wall(path("wall"));
+  write_wall(path("other"));
+  fs::create_directory_symlink("wall", path("link"));
+  const std::string list = slurp(path("wall/rgb.txt"));
+  write("keep.mcap", "a letter");
+  for (const char* places : {"wall wall", "wall link", "link wall", "wall wall/copy", "wall/rgb/.. wall",
+                             "wall .", "wall other", "wall keep.mcap"}) {
+    const Outcome refused = run(std::string("convert ") + places + " --force --every 5");
+    EXPECT_EQ(refused.code, 2) << places << refused;
+    EXPECT_TRUE(refused.told("choose another")) << places << refused;
+    const Outcome unasked = run(std::string("convert ") + places);
+    EXPECT_EQ(unasked.code, 2) << places << unasked;
+    EXPECT_FALSE(unasked.told("--force replaces")) << places << unasked;
+  }
+  EXPECT_EQ(slurp(path("wall/rgb.txt")), list);
+  EXPECT_EQ(slurp(path("other/rgb.txt")), list);
+  EXPECT_EQ(slurp(path("keep.mcap")), "a letter");
+
+  // Something of a user's own in a copy keeps it from being replaced, and so does a recording where it is
+  // first written.
+  ASSERT_EQ(run("convert wall copy -q").code, 0);
+  write("copy/notes.txt", "mine");
+  EXPECT_EQ(run("convert wall copy --force").code, 2);
+  fs::rename(path("other"), path("new.partial"));
+  const Outcome way = run("convert wall new");
+  EXPECT_EQ(way.code, 2) << way;
+  EXPECT_EQ(slurp(path("new.partial/rgb.txt")), list);
+}
+
+TEST_F(CliBags, WhatACopyCannotBeIsTold) {
+  write_wall(path("wall"));
+  for (const char* name : {"c.bag", "c.db3", "c.zip", "c.mp4", "c.MCAP"}) {
+    EXPECT_EQ(run(std::string("convert wall ") + name).code, 2) << name;
+    EXPECT_FALSE(fs::exists(path(name))) << name;
+  }
+  const Outcome nowhere = run("convert wall no/folder/c.mcap");
+  EXPECT_EQ(nowhere.code, 5) << nowhere;
+  EXPECT_TRUE(nowhere.told("make the folder first")) << nowhere;
+  EXPECT_FALSE(nowhere.told("frames")) << nowhere;
+  const Outcome bag = run("convert wall c.mcap");
+  EXPECT_TRUE(bag.told("warning: the ground truth is not in the copy")) << bag;
+  EXPECT_FALSE(run("convert wall c").told("warning")) << "a folder has it";
 }
 
 }  // namespace

@@ -30,6 +30,27 @@ TEST_F(Calibrate, TooLittleToTellIsSaid) {
   EXPECT_FALSE(fs::exists(path("found.yaml")));
 }
 
+TEST_F(Calibrate, OutputIsCheckedBeforeTheWork) {
+  write_wall(path("wall"));
+  write("cloud.ply", "mine");
+  write("notes.yaml", "mine: 1\n");
+  const std::string camera = slurp(path("wall/camera.yaml"));
+  write("own.yaml", camera);
+  for (const char* output : {"cloud.ply", "notes.yaml", "wall/camera.yaml"}) {
+    const Outcome o = run(std::string("calibrate wall -o ") + output);
+    EXPECT_EQ(o.code, 2) << output << o;
+  }
+  EXPECT_EQ(run("calibrate wall --camera own.yaml -o own.yaml").code, 2);
+  EXPECT_EQ(slurp(path("notes.yaml")), "mine: 1\n");
+  EXPECT_EQ(slurp(path("wall/camera.yaml")), camera);
+  const Outcome nowhere = run("calibrate wall -o no/folder.yaml");
+  EXPECT_EQ(nowhere.code, 5) << nowhere;
+  EXPECT_TRUE(nowhere.told("make the folder first")) << nowhere;
+  EXPECT_FALSE(nowhere.told("frames")) << nowhere;
+  EXPECT_EQ(run("calibrate wall -o own.yaml").code, 3)
+      << "a camera file may be replaced, but this is too little";
+}
+
 TEST_F(Calibrate, OneCameraAtATime) {
   write_wall(path("wall"));
   write_wall(path("other"));

@@ -91,6 +91,10 @@ TEST_F(Exports, AllPathsAreOneAndRunsWriteTheirExports) {
   EXPECT_EQ(gone.code, 0) << gone;
   EXPECT_TRUE(gone.told("poses only, without pictures")) << gone;
   EXPECT_TRUE(fs::exists(path("poses_only/sparse/0/images.bin")));
+  fs::create_directory(path("aside"));
+  const Outcome there = run("export ../out -o there", "cd aside && ");
+  EXPECT_EQ(there.code, 0) << there;
+  EXPECT_TRUE(fs::exists(path("aside/there/images"))) << "the recording is found from another folder";
   const Outcome robots = run("export out -o twice --recording a --recording b");
   EXPECT_TRUE(robots.told("2 given, the map is of 1 robot")) << robots;
 

@@ -242,6 +242,23 @@ TEST_F(FilterRuns, LargeCoordinatesKeepTheirDigits) {
   const auto drawn = run("render utm.ply -o utm.png");
   EXPECT_EQ(drawn.code, 0) << drawn;
   EXPECT_TRUE(drawn.told("shift: 701362 4485513 0 m")) << drawn;
+
+  const auto measured = run("evaluate cloud utm.ply utm.ply --json");
+  ASSERT_EQ(measured.code, 0) << measured;
+  EXPECT_TRUE(measured.told("shift: 701362 4485513 0 m")) << measured;
+  const auto report = nlohmann::json::parse(measured.out);
+  EXPECT_NEAR(report["density"]["spacing_mm"], 10.0, 0.01) << measured;
+  EXPECT_EQ(report["accuracy_mm"]["max"], 0.0) << measured;
+}
+
+TEST_F(FilterRuns, CloudsFarApartAreNotMerged) {
+  write("utm.ply", kUtm);
+  write("local.xyz", "0 0 1\n1 0 1\n");
+  write("voxel.yaml", "chain: v\nfilters:\n  - {type: voxel_grid, leaf: 5 mm}\n");
+  const auto merged = run("filter voxel.yaml local.xyz utm.ply out.ply");
+  EXPECT_EQ(merged.code, 3) << merged;
+  EXPECT_TRUE(merged.told("local.xyz and utm.ply lie 4540 km apart")) << merged;
+  EXPECT_FALSE(fs::exists(path("out.ply")));
 }
 
 TEST_F(FilterRuns, ChainThatLeavesNothingIsNotTrusted) {
@@ -254,6 +271,10 @@ TEST_F(FilterRuns, ChainThatLeavesNothingIsNotTrusted) {
   EXPECT_EQ(ran.code, 4) << ran;
   EXPECT_TRUE(ran.told("filters[1] (pass_through) took the last of 1 points")) << ran;
   EXPECT_EQ(cloud::read_cloud(path("out.ply"))->cloud->size(), 0U);
+  EXPECT_EQ(run("info out.ply").out, "points: 0\nnote: the cloud is empty\n");
+  const auto drawn = run("render out.ply -o out.png");
+  EXPECT_EQ(drawn.code, 0) << drawn;
+  EXPECT_TRUE(drawn.told("out.ply: the cloud has no points")) << drawn;
 }
 
 TEST_F(FilterRuns, NothingIsReadOrWrittenWhenTheCommandCannotEndWell) {

@@ -55,6 +55,11 @@ TEST_F(Fuse, TwoMapsOfOneRoomInAnyOrder) {
     EXPECT_TRUE(fs::exists(path("ab/robots") / robot / "keyframes.txt"));
   }
   EXPECT_FALSE(fs::exists(path("ab/trajectory.txt")));
+  const Outcome several = run("evaluate trajectory ab world/robot0");
+  EXPECT_EQ(several.code, 3) << several;
+  EXPECT_TRUE(several.told("ab/robots/a")) << several;
+  const Outcome posed = run("export ab -o model");
+  EXPECT_TRUE(posed.told(" 0 pictures")) << posed;
   const auto cloud = cloud::read_cloud(path("ab/map.ply"));
   ASSERT_TRUE(cloud.has_value());
   ASSERT_EQ(cloud->columns.robot.size(), cloud->cloud->size());
@@ -126,6 +131,9 @@ TEST_F(Fuse, RobotsSideBySideMeetWhileTheyMap) {
   const std::string lean =
       " --set output.views= --set output.pcd=off --set cloud.filters=[] --set fuse.voxel=3cm "
       "--set merge.min_pairs=3";
+  const Outcome twice = run("map world/robot0 world/../world/robot0 -o two" + lean);
+  EXPECT_EQ(twice.code, 2);
+  EXPECT_TRUE(twice.told("is given twice")) << twice;
   const Outcome o = run("map world/robot0 twin -o two --threads 2" + lean);
   ASSERT_EQ(o.code, 0) << o;
   EXPECT_TRUE(o.told("have met")) << o;

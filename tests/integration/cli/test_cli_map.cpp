@@ -310,6 +310,12 @@ TEST_F(MapCommand, CtrlCWritesWhatWasMapped) {
   EXPECT_TRUE(fs::exists(path("out/map.ply")));
   EXPECT_NE(slurp(path("out.txt")).find("stopped after"), std::string::npos);
   EXPECT_NE(slurp(path("err.txt")).find("stopping"), std::string::npos);
+
+  const Outcome resumed = run(
+      "map 'synth:room?frames=3000&width=160&height=120' -o out -p known_poses --set output.views= --resume");
+  EXPECT_EQ(resumed.code, 2) << resumed;
+  EXPECT_TRUE(resumed.told("was stopped after") && resumed.told("of 3000 frames") && resumed.told("--force"))
+      << resumed;
 }
 
 TEST_F(MapCommand, AGeneratedWorldIsARecordingToo) {

@@ -53,6 +53,8 @@ TEST_F(Progress, LogsGetLinesAndQuietRunsNothing) {
   const Outcome lines = run("map wall -o out -p known_poses --set output.views=");
   EXPECT_TRUE(lines.told("plumbline: 12 of 12 frames, ")) << lines;
   EXPECT_TRUE(lines.told("plumbline: finishing: fuse\n")) << lines;
+  const Outcome views = run("export out -o model.obj --mesh");
+  EXPECT_FALSE(views.told("a second")) << "there is no rate of things that are not frames" << views;
   EXPECT_TRUE(objects(lines.err).empty()) << lines;
   EXPECT_EQ(lines.err.find('\r'), std::string::npos) << lines;
 

@@ -173,7 +173,7 @@ TEST_F(Report, AccuracyAgainstTruthAndSavedEvaluations) {
   EXPECT_EQ(run("report out --truth nothing --force").code, 3);
   const Outcome empty = run("report out --truth out --force");
   EXPECT_EQ(empty.code, 3) << empty;
-  EXPECT_TRUE(empty.told("no groundtruth.txt that fits")) << empty;
+  EXPECT_TRUE(empty.told("no groundtruth.txt that fits; looked for out/groundtruth.txt")) << empty;
   write("late.txt", "900 0 0 0 0 0 0 1\n901 1 0 0 0 0 0 1\n902 1 1 0 0 0 0 1\n");
   EXPECT_EQ(run("report out --truth late.txt --force").code, 3);  // no common time
 }
@@ -250,6 +250,18 @@ TEST_F(Report, WhatIsMissingIsTold) {
   write("out/summary.json",
         R"({"frames": {"read": null, "lost": "x"}, "trustworthy": true, "merges": 3, "loops": []})");
   EXPECT_TRUE(has(page("out"), "\u2013"));  // a dash for what is not known
+}
+
+TEST_F(Report, OfARobotsMapMissesNothing) {
+  write_wall(path("wall"));
+  ASSERT_EQ(run("map wall -o out -q -p robot").code, 0);
+  const Outcome o = run("report out");
+  EXPECT_EQ(o.code, 0) << o;
+  EXPECT_FALSE(o.told("warning")) << o;
+  EXPECT_TRUE(o.told("its pipeline robot has no stage output")) << o;
+  const std::string html = page("out");
+  EXPECT_TRUE(has(html, "Only map.db"));
+  EXPECT_FALSE(has(html, "Missing in this report"));
 }
 
 TEST_F(Report, RefusesWhatIsNoResult) {

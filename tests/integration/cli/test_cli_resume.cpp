@@ -201,6 +201,7 @@ TEST_F(ResumeCommand, OnlyTheSameRunIsGoneOnWith) {
   const Outcome finished = run("map wall --resume -o out --set output.views=");
   EXPECT_EQ(finished.code, 0) << finished;
   EXPECT_NE(finished.out.find("is finished"), std::string::npos) << finished;
+  EXPECT_NE(finished.out.find("--force"), std::string::npos) << finished;
   const Outcome fresh = run("map wall --resume -o fresh --to 0.5 --set output.views= -p fast");
   EXPECT_EQ(fresh.code, 0) << fresh;
   EXPECT_TRUE(fresh.told("starting with the first frame")) << fresh;

@@ -126,6 +126,15 @@ TEST_F(Tools, EvaluateTellsWhatIsThere) {
       "evaluate cloud out out/map.ply --json --trajectory out --truth out/trajectory.txt";
   EXPECT_EQ(nlohmann::json::parse(run(start).out)["alignment"]["type"], "se3");
   EXPECT_EQ(nlohmann::json::parse(run(start + " --align none").out)["alignment"]["type"], "none");
+
+  std::string far;
+  for (int i = 0; i < 400; ++i)
+    far += "90." + std::to_string(100 + i % 20) + " 0." + std::to_string(100 + i / 20) + " 90\n";
+  write("far.xyz", far);
+  const Outcome failed = run("evaluate cloud out far.xyz --align se3");
+  EXPECT_EQ(failed.code, 4) << failed;
+  EXPECT_NE(failed.out.find("overlap 0.0 %"), std::string::npos) << failed;
+  EXPECT_TRUE(failed.told("could not be aligned with far.xyz")) << failed;
 }
 
 TEST_F(Tools, SynthWritesARecordingThatMaps) {
@@ -151,6 +160,77 @@ TEST_F(Tools, FilterRunsAChainAndTellsWhatItDid) {
   EXPECT_TRUE(bad.told("bad.yaml:3:")) << bad;
   EXPECT_EQ(run("filter chain.yaml nothing.ply x.ply").code, 3);
   EXPECT_EQ(run("filter chain.yaml out/map.ply x.obj").code, 2);
+}
+
+TEST_F(Tools, ResultsRecordingsAndInputsAreNotWrittenOver) {
+  map_wall();
+  write("chain.yaml", "chain: coarse\nfilters:\n  - type: voxel_grid\n    leaf: 10 cm\n");
+  fs::create_directories(path("out/robots/a"));
+  write("out/robots/a/trajectory.txt", "as if of a robot\n");
+  fs::copy_file(path("out/map.ply"), path("in.ply"));
+  fs::create_symlink("out/map.ply", path("link.ply"));
+  const std::string map = slurp(path("out/map.ply"));
+  const std::string truth = slurp(path("wall/groundtruth.txt"));
+  for (const char* arguments :
+       {"export out -o out/map.ply", "export out -o link.ply", "export in.ply -o in.ply",
+        "export out --what trajectory -o out/trajectory.txt",
+        "export out --what trajectory -o wall/groundtruth.txt",
+        "export out --what trajectory -o out/robots/a/trajectory.txt", "export out -o out/config.pgm",
+        "filter chain.yaml in.ply in.ply", "filter chain.yaml in.ply out/map.ply",
+        "filter chain.yaml in.ply out/map.pcd", "render out -o wall/rgb/000.png"}) {
+    const Outcome refused = run(arguments);
+    EXPECT_EQ(refused.code, 2) << arguments << refused;
+    EXPECT_TRUE(refused.told("choose another name")) << arguments << refused;
+  }
+  EXPECT_TRUE(slurp(path("out/map.ply")) == map && slurp(path("in.ply")) == map);
+  EXPECT_EQ(slurp(path("wall/groundtruth.txt")), truth);
+
+  // New names in these folders may be written, and written again.
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_EQ(run("filter chain.yaml out/map.ply out/thin.ply").code, 0);
+    EXPECT_EQ(run("export out -o out/thin.pcd").code, 0);
+  }
+}
+
+TEST_F(Tools, StandardOutputThatCannotBeWrittenIsAnError) {
+  write("a.xyz", "0 0 1\n0 1 1\n");
+  for (const char* arguments : {"--help", "map --help", "--version", "filters list", "filters describe",
+                                "pipelines schema", "completion bash", "man map", "info a.xyz"}) {
+    const Outcome full = run(std::string(arguments) + " >/dev/full 2>err.txt; exit $?; :");
+    EXPECT_EQ(full.code, 5) << arguments << full;
+    EXPECT_TRUE(full.told("standard output: cannot be written (No space left on device)"))
+        << arguments << full;
+  }
+  EXPECT_EQ(run("filters describe 2>said.txt | true").code, 0);
+  EXPECT_EQ(slurp(path("said.txt")), "") << "a reader that closes its pipe wants no more";
+}
+
+TEST_F(Tools, TypingErrorsAreToldWithWhatIsNear) {
+  const auto told = [&](const std::string& arguments, const std::string& text) {
+    const Outcome o = run(arguments);
+    EXPECT_EQ(o.code, 2) << arguments << o;
+    EXPECT_EQ(o.err.rfind("plumbline: error: ", 0), 0U) << arguments << o;
+    EXPECT_TRUE(o.told(text)) << arguments << o;
+  };
+  told("", "a command is required");
+  told("mpa wall -o out", "there is no command 'mpa'; did you mean map?");
+  told("evaluate trajctory a b", "did you mean trajectory?");
+  told("map wall -o out --voxel 2cm", "there is no option --voxel");
+  told("map wall -o out --voxel=2cm", "--set STAGE.OPTION=VALUE");
+  told("render out --ouput x.png", "did you mean --output?");
+  told("report a b c d e f", "one argument too many");
+  told("map wall", "--output is required");
+  told("map wall -o out --poses some", "'some' (allowed: given, ignore, prior)");
+  told("render a.xyz -o a.png --size 80x60 --width 70", "give only one of them");
+  told("render a.xyz -o a.png --size 1000000x1000000", "64 to 8192 pixels");
+  write("a.xyz", "0 0 1\n0 1 1\n");
+  told("view a.xyz --http no-such-host.invalid", "there is no host no-such-host.invalid");
+  told("view a.xyz --http 192.0.2.1:8080", "is not an address of this machine");
+
+  const std::string help = run("map --help").out;
+  for (const char* text : {"--poses prior|given|ignore  Poses", "--pace HZ (0 to 1000)", "--for S (above 0)",
+                           "--threads N (1 to 256)", "--from S (0 or more)", "--format auto|tum|"})
+    EXPECT_NE(help.find(text), std::string::npos) << text << "\n" << help;
 }
 
 TEST_F(Tools, ShippedPipelinesAndFiltersHaveNothingWrong) {

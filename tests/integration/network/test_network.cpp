@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Hub and robots as people run them: whatever the network does, the map is that of plumbline fuse.
+#include <sqlite3.h>
+
 #include "network/network_test.hpp"
 #include "store_dump.hpp"
 
@@ -156,6 +158,35 @@ TEST_F(Network, WhoIsMissingIsNamedAndWhatIsThereIsFused) {
   h.send(SIGINT);
   EXPECT_EQ(h.wait(kLong_s), 4) << h.told();
   EXPECT_NE(h.told().find("1 of 2 robots did not connect"), std::string::npos) << h.told();
+  EXPECT_TRUE(fs::exists(path("out/map.ply")));
+}
+
+TEST_F(Network, ADamagedMapIsLeftOutAndNamed) {
+  Process h = hub(" --robots 3");  // one never comes
+  for (const std::string name : {"a", "b"}) {
+    fs::copy(world(name), path(name), fs::copy_options::recursive);
+    Process process = start(name, "robot " + name + " --name " + name + network());
+    ASSERT_EQ(process.wait(kLong_s), 0) << process.told() << h.told();
+  }
+  h.end(SIGKILL);
+
+  const std::string copy = path("out.partial/robots/b/map.db").string();
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open(copy.c_str(), &database), SQLITE_OK);
+  EXPECT_EQ(sqlite3_exec(database, "UPDATE keyframe SET data = zeroblob(100) WHERE number = 1", nullptr,
+                         nullptr, nullptr),
+            SQLITE_OK);
+  EXPECT_EQ(sqlite3_changes(database), 1);
+  sqlite3_close(database);
+
+  const std::size_t first = h.told().size();
+  h = hub(" --robots 3 --resume");
+  const auto waits = [&] { return h.told().find("waiting for", first) != std::string::npos; };
+  ASSERT_TRUE(happens(waits, kLong_s)) << h.told();
+  h.send(SIGINT);
+  EXPECT_EQ(h.wait(kLong_s), 4) << h.told();
+  EXPECT_NE(h.told().find("b is left out: "), std::string::npos) << h.told();
+  EXPECT_NE(h.told().find("robots/b/map.db: damaged"), std::string::npos) << h.told();
   EXPECT_TRUE(fs::exists(path("out/map.ply")));
 }
 

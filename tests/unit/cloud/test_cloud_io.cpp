@@ -166,6 +166,26 @@ TEST(CloudIo, ShiftOfWholeNumbersAndNoneWhereFloatsHold) {
   EXPECT_EQ((*rounded->cloud)[0].x, 701362.56F);
 }
 
+TEST(CloudIo, APathIsNoCloud) {
+  const std::string path = "# stamp tx ty tz qx qy qz qw\n1 0 0 1 0 0 0 1\n2 0.5 0 1 0 0.6 0 0.8\n";
+  const auto refused = read_cloud(spill("path.txt", path));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, core::ErrorKind::kInput);
+  EXPECT_NE(refused.error().message.find("is a path, not a cloud"), std::string::npos);
+  EXPECT_TRUE(read_cloud(spill("eight.txt", path + "3 0 0 1 7 0 0 1\n")));
+  EXPECT_TRUE(read_cloud(spill("named.csv", "x,y,z,a,b,c,d,e\n0,0,1,0,0,0,0,1\n")));
+}
+
+TEST(CloudIo, FloatsHoldNoTwoCloudsFarApart) {
+  const Eigen::Vector3d utm(691000, 5334000, 520);
+  EXPECT_TRUE(check_one_frame("a.ply", utm, "b.ply", utm + Eigen::Vector3d(9000, 0, 0)));
+  const auto apart = check_one_frame("a.ply", Eigen::Vector3d::Zero(), "b.ply", utm);
+  ASSERT_FALSE(apart);
+  EXPECT_EQ(apart.error().kind, core::ErrorKind::kInput);
+  EXPECT_NE(apart.error().message.find("a.ply and b.ply lie 5379 km apart"), std::string::npos)
+      << apart.error().message;
+}
+
 TEST(CloudIo, ShiftsAreChanged) {
   auto read = read_cloud(spill("change.xyz", kUtmPoints), LargeCoordinates::kShifted);
   ASSERT_TRUE(read);
@@ -420,6 +440,7 @@ TEST(CloudIo, OutputErrorsNameTheFileAndLeaveNothingBehind) {
   ASSERT_TRUE(write_ply(folder / "a.ply", cloud));
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 1);
   EXPECT_EQ(write_cloud(temp("a.obj"), cloud).error().kind, core::ErrorKind::kUsage);
+  EXPECT_TRUE(write_cloud(temp("A.PLY"), cloud));
   CloudColumns wrong;
   wrong.confidence.resize(3);
   EXPECT_THROW(write_ply(temp("w.ply"), cloud, wrong), std::invalid_argument);

@@ -94,6 +94,8 @@ TEST(Options, EveryProblemIsToldWithPlaceAndRemedy) {
   EXPECT_NE(told.find("stages.s.box: has 1 numbers (allowed: 2)"), std::string::npos);
   EXPECT_EQ(s.count, 1000);  // nothing was changed
   EXPECT_EQ(s.box.size(), 2U);
+  EXPECT_NE(read(s, "leaf: 0,5cm\n").find("'0,5cm': decimal comma; write numbers with a point"),
+            std::string::npos);
 }
 
 TEST(Options, RefusesWhatOnlyLooksLikeANumber) {

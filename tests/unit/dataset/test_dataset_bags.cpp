@@ -149,6 +149,15 @@ TEST_F(Bags, NothingIsReplacedThatIsNoCopy) {
   options.replace = true;
   EXPECT_FALSE(convert_recording(**source, folder_ / "mine", options, log_));
   EXPECT_EQ(bytes_of("mine/letter.txt"), "dear");
+
+  // Neither a recording that no copy made, nor a live camera's.
+  write_text("other/associations.txt", "1 rgb/1.png 1 depth/1.png\n");
+  EXPECT_FALSE(convert_recording(**source, folder_ / "other", options, log_));
+  copy("live.mcap");
+  std::string live = bytes_of("live.mcap");
+  live.replace(live.find("plumbline convert"), 17, "plumbline 0.2.0.0");
+  write_text("live.mcap", live);
+  EXPECT_FALSE(convert_recording(**source, folder_ / "live.mcap", options, log_));
 }
 
 TEST_F(Bags, OfACutFileWhatIsBeforeTheBreakIsRead) {
@@ -215,7 +224,7 @@ class Topics : public Bags {
                  const std::vector<std::pair<std::string, std::string>>& images) const {
     const auto& part = core::part<BagReaders>();
     ASSERT_TRUE(part);
-    const auto bag = (*part)->create_mcap(folder_ / name);
+    const auto bag = (*part)->create_mcap(folder_ / name, "plumbline");
     for (const auto& [topic, encoding] : images) {
       ImageMessage message;
       message.header = {1'000'000'000, "camera"};

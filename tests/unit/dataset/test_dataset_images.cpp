@@ -403,6 +403,17 @@ TEST_F(Frames, OneGoodFrameIsEnoughToOpen) {
   EXPECT_TRUE((*source)->read(11));
 }
 
+TEST_F(Frames, FocalLengthsThatNoCameraHasAreRefused) {
+  write_tum(3);
+  const std::string rest = "width: 64\nheight: 48\ncx: 31.5\ncy: 23.5\ndepth_scale: 5000\n";
+  write_text("camera.yaml", rest + "fx: 5.2\nfy: 52\n");
+  EXPECT_THAT(open_error(), AllOf(HasSubstr("fx 5.2 and fy 52"), HasSubstr("pixels are nearly square")));
+  for (const char* lengths : {"fx: 520\nfy: 520\n", "fx: 5.2\nfy: 5.2\n"}) {
+    write_text("camera.yaml", rest + lengths);
+    EXPECT_THAT(open_error(), HasSubstr("correct the camera file"));
+  }
+}
+
 class DepthScale : public RecordingTest {
  protected:
   void write(int raw_depth, const std::string& scale) {

@@ -306,9 +306,9 @@ TEST_F(TwoSizes, TheCalibrationMayBeThatOfDepth) {
 
 TEST_F(TwoSizes, LargeColourIsReducedByAWholeFactor) {
   write({1280, 96}, {64, 48},
-        "width: 1280\nheight: 96\nfx: 104\nfy: 104\ncx: 639.5\ncy: 47.5\ndepth_scale: 1000\n"
+        "width: 1280\nheight: 96\nfx: 208\nfy: 208\ncx: 639.5\ncy: 47.5\ndepth_scale: 1000\n"
         "color_from_depth: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n"
-        "depth: {width: 64, height: 48, fx: 52, fy: 52, cx: 31.5, cy: 23.5}\n");
+        "depth: {width: 64, height: 48, fx: 104, fy: 104, cx: 31.5, cy: 23.5}\n");
   const auto source = open();
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_EQ((*source)->camera().color.width, 640);

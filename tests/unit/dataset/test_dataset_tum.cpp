@@ -180,6 +180,9 @@ TEST_F(Tum, FromToEvery) {
   options.from_s = 50.0;
   options.to_s = 60.0;
   EXPECT_THAT(open_error(options), AllOf(HasSubstr("nothing lies between"), HasSubstr("0.90 s long")));
+  options.to_s = OpenOptions().to_s;
+  EXPECT_THAT(open_error(options),
+              HasSubstr("nothing lies after 50 s (--from); the recording ends at 0.90 s"));
   options.every = 0;
   EXPECT_THAT(open_error(options), HasSubstr("every: 0"));
 }

@@ -387,10 +387,66 @@ TEST(AlignCloud, TrajectoriesBridgeWhatIcpCannot) {
   const auto lost = evaluate_cloud(cloud, &reference, options, {}, two_threads());
   ASSERT_TRUE(lost);
   EXPECT_FALSE(lost->warnings.empty());
+  EXPECT_TRUE(lost->alignment.failed);
   for (auto& pose : pair.truth) pose.stamp += 1e5;
   const auto apart = evaluate_cloud(cloud, &reference, options, {pair}, two_threads());
   ASSERT_FALSE(apart);
   EXPECT_NE(apart.error().message.find("do not overlap in time"), std::string::npos);
+}
+
+/// Samples whose points are less `shift` and lie where those of `samples` lie, seen from `origin`.
+SurfaceSamples shifted(SurfaceSamples samples, const Eigen::Vector3d& origin, const Eigen::Vector3d& shift) {
+  for (auto& p : samples.points) p = (p.cast<double>() + origin - shift).cast<float>();
+  samples.shift = shift;
+  return samples;
+}
+
+TEST(EvaluateCloud, LargeCoordinatesAreMeasuredLessTheirShifts) {
+  const Eigen::Vector3d utm(691000, 5334000, 520);
+  const SurfaceSamples room = box({1.0, 0.8, 0.6}, 0.02);
+  const SurfaceSamples cloud = shifted(room, utm, utm + Eigen::Vector3d(5, -3, 0));
+  Reference reference = reference_of(box_mesh({1.0F, 0.8F, 0.6F}));
+  reference.shift = utm;
+  const auto report = run(cloud, reference);
+  ASSERT_TRUE(report) << report.error().message;
+  expect_all_mm(report->accuracy_mm, 0.0, 0.01);
+  EXPECT_NEAR(report->spacing_mm, 20.0, 0.01);
+  EXPECT_LT(report->alignment.reference_from_cloud.translation.norm(), 1e-6);
+  ASSERT_FALSE(report->planes.empty());
+  const WallPlane& plane = report->planes.front();
+  const double inside_m = plane.normal.dot(utm + Eigen::Vector3d(0.5, 0.4, 0.3)) - plane.offset_m;
+  EXPECT_GT(inside_m, 0.29);
+  EXPECT_LT(inside_m, 0.51);
+
+  reference.shift.setZero();
+  const auto apart = run(cloud, reference);
+  ASSERT_FALSE(apart);
+  EXPECT_NE(apart.error().message.find("the cloud and reference lie 5379 km apart"), std::string::npos);
+}
+
+TEST(AlignCloud, PlacementsAreInTheCoordinatesOfTheFiles) {
+  const Eigen::Vector3d utm(691000, 5334000, 520);
+  const SurfaceSamples room = box({3.0, 2.0, 2.4}, 0.04);
+  const Eigen::Isometry3d turned = Eigen::Translation3d(0.06, -0.05, 0.04) *
+                                   Eigen::AngleAxisd(0.02, Eigen::Vector3d(1, 2, -1).normalized());
+  TrajectoryPair pair;
+  for (int i = 0; i < 60; ++i) {
+    const Eigen::Vector3d place(1.5 + std::cos(0.1 * i), 1.0 + 0.5 * std::sin(0.1 * i), 1.2 + 0.01 * i);
+    pair.truth.push_back({0.1 * i, {Eigen::Matrix3d::Identity(), utm + place}});
+    pair.estimate.push_back({0.1 * i, {Eigen::Matrix3d::Identity(), turned.inverse() * place}});
+  }
+
+  Reference reference = reference_of(room);
+  reference.shift = utm;
+  CloudOptions options;
+  options.align = CloudAlignment::kSe3;
+  const SurfaceSamples local = moved(room, turned.inverse());
+  const auto report = evaluate_cloud(local, &reference, options, {pair}, two_threads());
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_FALSE(report->alignment.failed);
+  EXPECT_LT(report->accuracy_mm.p90, 0.05);
+  const Eigen::Vector3d origin = report->alignment.reference_from_cloud * Eigen::Vector3d::Zero();
+  EXPECT_LT((origin - utm - turned.translation()).norm(), 1e-4);
 }
 
 TEST(AlignCloud, APlaneLeavesThreeDirectionsAsTheyWereAndSaysSo) {

@@ -122,6 +122,23 @@ TEST_F(LoadReference, TheCloudUnderTestKeepsPointsThatAreNotFinite) {
   EXPECT_EQ(cloud->normals[0], Eigen::Vector3f::UnitZ().eval());
 }
 
+TEST_F(LoadReference, LargeCoordinatesKeepTheirDigits) {
+  const std::string points = "701362.56 4485513.72 100.00\n701362.57 4485513.72 100.00\n";
+  const std::string header =
+      "ply\nformat ascii 1.0\nelement vertex 2\nproperty double x\nproperty double y\nproperty double z\n"
+      "end_header\n";
+  const Eigen::Vector3d shift(701362, 4485513, 0);
+  for (const auto& file : {write("utm.ply", header + points), write("utm.xyz", points)}) {
+    const auto reference = load_reference(file);
+    const auto cloud = load_cloud(file);
+    ASSERT_TRUE(reference && cloud) << file;
+    EXPECT_EQ(reference->shift, shift);
+    EXPECT_EQ(cloud->shift, shift);
+    for (const SurfaceSamples& samples : {reference->samples, *cloud})
+      EXPECT_NEAR((samples.points[1] - samples.points[0]).norm(), 0.01, 1e-6) << file;
+  }
+}
+
 TEST_F(FindTrajectories, OneRobot) {
   const fs::path cloud = write("map/map.ply", "");
   const fs::path reference = write("world/reference.ply", "");

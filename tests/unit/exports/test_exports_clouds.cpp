@@ -69,6 +69,36 @@ TEST_F(ExportCloud, LasHoldsLargeCoordinatesWhole) {
   EXPECT_EQ(applied["epsg"], 32633);
 }
 
+TEST_F(ExportCloud, AnExportWithoutGeoreferenceRemovesThatOfAnEarlierOne) {
+  ExportRequest wanted = request("out.las");
+  wanted.options.datum = {48.1, 11.5, 30.0};
+  wanted.given = {"datum"};
+  ASSERT_TRUE(write(wanted));
+  ASSERT_TRUE(fs::exists(path("out.las.georeference.json")));
+  ASSERT_TRUE(write(request("out.las")));
+  EXPECT_FALSE(fs::exists(path("out.las.georeference.json")));
+}
+
+TEST_F(ExportCloud, WarnsAboutAnOriginOutsideOfTheSystem) {
+  class Warnings : public core::Log {
+   public:
+    void write(core::LogLevel level, const std::string& message) override {
+      if (level == core::LogLevel::kWarning) text += message;
+    }
+    std::string text;
+  };
+  ExportRequest wanted = request("out.las");
+  wanted.options.epsg = 25832;
+  wanted.given = {"epsg", "origin"};
+  for (const bool exchanged : {false, true}) {
+    Warnings log;
+    wanted.options.origin = {691000, 5334000, 520};
+    if (exchanged) std::swap(wanted.options.origin[0], wanted.options.origin[1]);
+    ASSERT_TRUE(write_export(wanted, executor_, log, nullptr));
+    EXPECT_EQ(log.text.find("--origin 5334000,691000: ") != std::string::npos, exchanged) << log.text;
+  }
+}
+
 TEST_F(ExportCloud, GlbIsYUp) {
   ASSERT_TRUE(write(request("out.glb")));
   const std::string glb = bytes("out.glb");

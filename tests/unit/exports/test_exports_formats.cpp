@@ -56,6 +56,7 @@ TEST(ExportFormats, AreChosenByEndingContentAndName) {
   EXPECT_TRUE(checked("a.csv", Content::kCloud, "", {"voxel"})) << "a table of points";
   EXPECT_TRUE(checked("a.obj", Content::kCloud, "", {"reach"})) << "only meshes are .obj";
   EXPECT_TRUE(checked("paths", Content::kTrajectory, "kitti"));
+  EXPECT_TRUE(checked("A.PLY", Content::kCloud, "", {"ascii"}));
 }
 
 TEST(ExportFormats, SayWhatIsWrong) {
@@ -70,6 +71,7 @@ TEST(ExportFormats, SayWhatIsWrong) {
   EXPECT_NE(wrong(checked("a.glb", Content::kCloud, "", {"reach"})).find("without --mesh"),
             std::string::npos);
   EXPECT_NE(wrong(checked("a.las", Content::kLines)).find("lines"), std::string::npos);
+  EXPECT_NE(wrong(checked("paths", Content::kTrajectory)).find("--format kitti -o paths"), std::string::npos);
   EXPECT_NE(wrong(checked("a", Content::kCloud, "colmpa")).find("colmap"), std::string::npos)
       << "did you mean";
   EXPECT_EQ(checked("a.e57").error().kind, core::ErrorKind::kUsage);

@@ -59,7 +59,6 @@ class ExportPlan : public ExportTest {
     return n;
   }
 
- private:
   cloud::Cloud cloud_;
 };
 
@@ -74,6 +73,28 @@ TEST_F(ExportPlan, FindsWallsDoorsAndRooms) {
   EXPECT_EQ(found.count("2.50"), 2U);
   EXPECT_EQ(found.count("1: 12.00 m2"), 1U);
   EXPECT_EQ(found.count("2: 7.50 m2"), 1U);
+}
+
+TEST_F(ExportPlan, FindsTheFloorAndWallsAtLargeCoordinates) {
+  for (float x = 0.0F; x < 6.6F; x += 0.04F) {
+    for (float y = 0.0F; y < 3.0F; y += 0.04F) cloud_.push_back(point(x, y, 0));
+  }
+  for (const double height_m : {520.0, 2520.0}) {
+    ASSERT_TRUE(cloud::write_ply(path("cloud.ply"), cloud_, {}, Eigen::Vector3d(691000, 5334000, height_m)));
+    const auto nothing = write(request("plan.dxf"));
+    ASSERT_FALSE(nothing);
+    const std::string heights = fmt::format("{:.2f} to {:.2f} m", height_m, height_m + 2.6);
+    EXPECT_NE(nothing.error().message.find(heights), std::string::npos) << nothing.error().message;
+    EXPECT_NE(nothing.error().message.find("--storey 0"), std::string::npos) << nothing.error().message;
+
+    ExportRequest wanted = request("plan.dxf");
+    wanted.options.storey = 0;
+    wanted.given = {"storey"};
+    const auto summary = write(wanted);
+    ASSERT_TRUE(summary) << summary.error().message;
+    EXPECT_EQ(summary->notes.front(), "8 walls, 1 doors, 2 closed rooms");
+    EXPECT_NE(bytes("plan.dxf").find("691004."), std::string::npos);
+  }
 }
 
 TEST_F(ExportPlan, ACutAboveTheDoorMeetsItsLintel) {

@@ -89,6 +89,10 @@ TEST_F(OutputFolders, WhatAKilledRunLeftIsTakenOver) {
     EXPECT_FALSE(OutputFolder::prepare(folder_ / "out", false, true)) << "one at a time";
   }
   EXPECT_TRUE(fs::exists(folder_ / "out.partial" / "map.db")) << "it failed, and the next one may go on";
+  const auto fresh = OutputFolder::prepare(folder_ / "out", false);
+  ASSERT_FALSE(fresh);
+  EXPECT_NE(fresh.error().message.find("--resume continues it, --force drops it"), std::string::npos);
+  EXPECT_TRUE(fs::exists(folder_ / "out.partial" / "map.db"));
   auto out = OutputFolder::prepare(folder_ / "out", false, true);
   ASSERT_TRUE(out) << out.error().message;
   ASSERT_TRUE(out->commit());

@@ -193,10 +193,14 @@ core::Result<void> add_truth(const fs::path& truth, ReportData& data) {
   }
 
   if (pairs.empty()) {
+    std::string looked_for = (truth / "groundtruth.txt").string();
+    for (const ReportPath& path : data.paths) {
+      if (!path.robot.empty()) looked_for += ", " + (truth / path.robot / "groundtruth.txt").string();
+    }
     return core::input_error(
-        fmt::format("--truth {}: there is no groundtruth.txt that fits; name a recording with truth, a "
-                    "folder with one for each robot, or a file in TUM format",
-                    truth.string()));
+        fmt::format("--truth {}: there is no groundtruth.txt that fits; looked for {}; name a recording with "
+                    "truth, a folder with one for each robot, named like it, or a file in TUM format",
+                    truth.string(), looked_for));
   }
 
   if (pairs.size() > 1) data.joint_m = joint_error(pairs);

@@ -49,6 +49,8 @@ std::string verdict_html(const ReportData& data) {
                               count_at(s, "/frames/available")));
   }
 
+  if (!data.kind.empty()) out += banner("warn", "Only map.db", "The " + data.kind + ".");
+
   if (!data.missing.empty()) {
     std::string list;
     for (const std::string& line : data.missing) list += "<li>" + viz::markup_text(line) + "</li>";

@@ -53,7 +53,7 @@ std::string snapshots_html(ReportData& data) {
       const std::string what =
           by_robot ? std::string(caption.text) + "; colours show which robot saw it" : caption.text;
       const std::string picture = picture_html(data.folder / name, what);
-      if (picture.empty()) data.missing.push_back(name + " is damaged");
+      if (picture.empty()) data.missing.push_back(name + " " + fault_of(data.folder / name));
       out += picture;
     }
   }

@@ -74,6 +74,11 @@ enum class LargeCoordinates {
 /// Moves a cloud that was read with one shift into the frame of one with another.
 void change_shift(Cloud& cloud, const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
+/// Checks that clouds with these shifts fit into one frame. Errors (kInput) name both: more than 10 km apart,
+/// which floats do not hold to a millimetre.
+core::Result<void> check_one_frame(const std::string& name, const Eigen::Vector3d& shift,
+                                   const std::string& other_name, const Eigen::Vector3d& other_shift);
+
 /// Reads PLY (ascii, binary), PCD (ascii, binary, binary_compressed) and text (.xyz .txt .csv .asc .pts: x y
 /// z, then 0-255 red green blue and/or nx ny nz; separated by blanks, commas or semicolons; a CSV header line
 /// names columns). Columns with other names are kept as 32 bit floats (lists, arrays and alpha are not).

@@ -7,8 +7,9 @@
 // move, further robots join it, and a merge is taken back if later evidence contradicts it. It is a preview:
 // duplicate landmarks are not merged, surfaces not aligned; fuse_maps of the finished maps decides.
 //
-// Work runs beside the caller, by logical time: a job that is started at frame k of a log is committed at
-// frame k + lag, independent of the clock. So the same log gives the same events for any number of threads.
+// Work runs beside the caller, by logical time: a job that is started at frame k is committed at frame
+// k + lag, independent of the clock. So the same calls give the same events for any number of threads.
+// A frame is the number of a frame of the run, or whatever else the caller counts by.
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -29,7 +30,7 @@ struct MeetingEvent {
   MeetingStep step = MeetingStep::kNone;
   std::size_t a = 0;  ///< number of the first robot; a < b
   std::size_t b = 0;
-  std::int64_t frame = 0;                   ///< frame of the log with the keyframe
+  std::int64_t frame = 0;                   ///< frame at which the keyframe was added
   core::KeyframeId keyframe;                ///< keyframe that caused the step
   MergeEvidence evidence;                   ///< evidence for kMet and kTakenBack
   std::shared_ptr<const FusedMap> preview;  ///< for kMet: all maps connected now; its parts are robots
@@ -47,19 +48,19 @@ struct RobotPlace {
 
 class MergeServer {
  public:
-  /// `lag`: frames of the log between taking keyframes and committing their results. The executor must
+  /// `lag`: frames between taking keyframes and committing their results. The executor must
   /// outlive this.
   MergeServer(const MapFusionOptions& options, int lag, const core::Executor& executor);
 
   /// Adds a robot; robots are numbered 0, 1, ..., in the ids of their maps too.
   std::size_t join(const Cameras& cameras);
 
-  /// Adds a keyframe that is new in `map`, the map of its robot, at a frame of the log; frames never
-  /// decrease. Throws std::invalid_argument: no such robot or keyframe.
+  /// Adds a keyframe that is new in `map`, the map of its robot, at a frame; frames never decrease. Throws
+  /// std::invalid_argument: no such robot or keyframe.
   void add(std::shared_ptr<const maps::Map> map, core::KeyframeId keyframe, std::int64_t frame);
   /// Events that are to be committed at this frame; mostly none. To be called for every frame, after add().
   std::vector<MeetingEvent> commit(std::int64_t frame);
-  /// All remaining events, when the log has ended.
+  /// All remaining events, after the last frame.
   std::vector<MeetingEvent> finish();
 
   /// Pose of the robot as of the last commit; none if it has met no other robot.

@@ -76,10 +76,10 @@ struct WrittenChunk {
 
 class McapWriter final : public BagWriter {
  public:
-  explicit McapWriter(const std::filesystem::path& file) : file_(file) {
+  McapWriter(const std::filesystem::path& file, const std::string& made_by) : file_(file) {
     put(Bytes(kMcapMagic.begin(), kMcapMagic.end()));
     put(record(McapOpcode::kHeader,
-               RecordFields().text("ros2").text("plumbline " + std::string(core::version()))));
+               RecordFields().text("ros2").text(made_by + " " + std::string(core::version()))));
   }
 
   void write(const std::string& topic, const ImageMessage& message) override {
@@ -275,8 +275,8 @@ core::Result<void> McapWriter::finish() {
 
 }  // namespace
 
-std::unique_ptr<BagWriter> create_mcap(const std::filesystem::path& file) {
-  return std::make_unique<McapWriter>(file);
+std::unique_ptr<BagWriter> create_mcap(const std::filesystem::path& file, const std::string& made_by) {
+  return std::make_unique<McapWriter>(file, made_by);
 }
 
 }  // namespace plumbline::dataset

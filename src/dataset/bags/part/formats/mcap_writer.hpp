@@ -6,6 +6,6 @@
 
 namespace plumbline::dataset {
 
-std::unique_ptr<BagWriter> create_mcap(const std::filesystem::path& file);
+std::unique_ptr<BagWriter> create_mcap(const std::filesystem::path& file, const std::string& made_by);
 
 }  // namespace plumbline::dataset
