@@ -8,6 +8,7 @@
 
 #include "formats.hpp"
 #include "plumbline/core/config.hpp"
+#include "plumbline/core/text.hpp"
 #include "plumbline/maps/output_check.hpp"
 #include "source/georeference.hpp"
 
@@ -67,7 +68,7 @@ core::Result<Choice> chosen_by_name(const ExportRequest& request) {
 }
 
 core::Result<Choice> chosen_by_ending(const ExportRequest& request) {
-  const std::string name = lower(request.output.filename().string());
+  const std::string name = core::lower(request.output.filename().string());
   Choice best;
   std::size_t longest = 0;
   std::vector<std::string> endings;
@@ -88,8 +89,7 @@ core::Result<Choice> chosen_by_ending(const ExportRequest& request) {
     best = {&format, fits ? request.content : format.contents.front()};
   }
 
-  const bool text_of_a_path =
-      best.content != request.content && lower(request.output.extension().string()) == ".txt";
+  const bool text_of_a_path = best.content != request.content && core::ending_of(request.output) == ".txt";
   if (best.format != nullptr && !text_of_a_path) return best;
   const bool path = request.content == Content::kTrajectory || request.content == Content::kKeyframes;
   if (folder && path) {

@@ -102,7 +102,7 @@ class Terminal:
     def read_until(self, wanted, seconds=30.0):
         seen = ""
         end = time.monotonic() + seconds
-        while time.monotonic() < end and wanted not in seen:
+        while time.monotonic() < end and wanted not in plain(seen):
             if select.select([self.master], [], [], 0.1)[0]:
                 try:
                     seen += os.read(self.master, 65536).decode(errors="replace")

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <system_error>
 #include <vector>
 
 #include "plumbline/core/numbers.hpp"
@@ -59,12 +58,6 @@ SceneExtent extent_of(const Scene& scene) {
   return extent;
 }
 
-/// Removes the last pictures of an earlier turntable that had more than `pictures`.
-void remove_earlier(const std::filesystem::path& folder, int pictures) {
-  std::error_code ignored;
-  for (int k = pictures; std::filesystem::remove(folder / fmt::format("{:04}.png", k), ignored);) ++k;
-}
-
 }  // namespace
 
 core::Result<void> render_turntable(const Scene& scene, const SnapshotOptions& options, int pictures,
@@ -91,7 +84,6 @@ core::Result<void> render_turntable(const Scene& scene, const SnapshotOptions& o
     if (progress) progress(static_cast<std::size_t>(k) + 1, static_cast<std::size_t>(pictures));
   }
 
-  remove_earlier(folder, pictures);
   return {};
 }
 

@@ -12,8 +12,7 @@ namespace plumbline::viz {
 
 /// Draws `pictures` views from evenly spaced directions all round, looking down at 35 degrees, all of one
 /// scale: folder/0000.png, 0001.png ... `options.view` is not used. `progress` gets the pictures drawn so far
-/// and in all, and may be empty. What an earlier turntable there had more is removed. Errors as
-/// render_snapshot's, and kUsage for fewer than 2 pictures.
+/// and in all, and may be empty. Errors as render_snapshot's, and kUsage for fewer than 2 pictures.
 core::Result<void> render_turntable(const Scene& scene, const SnapshotOptions& options, int pictures,
                                     const std::filesystem::path& folder,
                                     const std::function<void(std::size_t, std::size_t)>& progress = {});

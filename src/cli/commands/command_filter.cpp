@@ -12,6 +12,7 @@
 #include "app.hpp"
 #include "plumbline/cloud/columns.hpp"
 #include "plumbline/cloud/filters/filter_chain.hpp"
+#include "plumbline/core/text.hpp"
 #include "plumbline/maps/output_check.hpp"
 
 namespace plumbline::cli {
@@ -37,7 +38,7 @@ core::Result<cloud::FilterChain> load_chain(const std::string& name, const Sessi
 /// Reports a problem with the output before anything is read.
 core::Result<void> check_outputs(const FilterRequest& request, const cloud::FilterChain& chain) {
   const fs::path& output = request.files.back();
-  const std::string extension = CLI::detail::to_lower(output.extension().string());
+  const std::string extension = core::ending_of(output);
   if (extension != ".ply" && extension != ".pcd") {
     return core::usage_error(fmt::format("{}: clouds are written as .ply or .pcd", output.string()));
   }

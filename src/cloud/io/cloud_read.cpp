@@ -7,6 +7,7 @@
 
 #include "io/cloud_table.hpp"
 #include "plumbline/cloud/io/ply.hpp"
+#include "plumbline/core/text.hpp"
 
 namespace plumbline::cloud {
 
@@ -78,9 +79,7 @@ core::Result<CloudFile> read_cloud(const std::filesystem::path& file, LargeCoord
   if (std::filesystem::is_directory(file, error)) {
     return core::input_error(file.string() + ": is a folder, a cloud file is needed");
   }
-  std::string ending = file.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = core::ending_of(file);
   if (ending == ".ply") return read_ply_cloud(file, large);
   if (ending == ".pcd") return read_pcd_cloud(file, large);
   if (ending == ".xyz" || ending == ".txt" || ending == ".csv" || ending == ".asc" || ending == ".pts") {

@@ -12,6 +12,7 @@
 #include "finite.hpp"
 #include "io/scalar.hpp"
 #include "io/shift.hpp"
+#include "plumbline/core/text.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -70,9 +71,7 @@ Meaning meaning_of(const std::string& name) {
       {"robot", Meaning::kRobot},
   }};
 
-  std::string lower = name;
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string lower = core::lower(name);
 
   for (const auto& [known, meaning] : kNames) {
     if (lower == known) return meaning;

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <stdexcept>
 #include <vector>
@@ -14,6 +13,7 @@
 #include "io/shift.hpp"
 #include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/core/output_file.hpp"
+#include "plumbline/core/text.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -131,9 +131,7 @@ core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& clo
 
 core::Result<void> write_cloud(const std::filesystem::path& file, const Cloud& cloud,
                                const CloudColumns& columns, const Eigen::Vector3d& shift) {
-  std::string ending = file.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = core::ending_of(file);
   if (ending == ".ply") return write_ply(file, cloud, columns, shift);
   if (ending == ".pcd") return write_pcd(file, cloud, columns, shift);
   return core::usage_error(fmt::format(

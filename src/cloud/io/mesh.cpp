@@ -11,7 +11,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <memory>
 #include <utility>
@@ -20,6 +19,7 @@
 #include "filters/pcl_functions.hpp"
 #include "io/shift.hpp"
 #include "plumbline/core/output_file.hpp"
+#include "plumbline/core/text.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -171,9 +171,7 @@ core::Result<PlyData> make_mesh(const Cloud& cloud, const MeshOptions& options) 
 }
 
 core::Result<void> write_mesh(const std::filesystem::path& file, const PlyData& mesh) {
-  std::string ending = file.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = core::ending_of(file);
   if (ending == ".ply") return write_ply(file, mesh);
   if (ending == ".obj") return write_obj(file, mesh);
   return core::usage_error(fmt::format("{}: meshes are written as .ply or .obj", file.string()));

@@ -134,8 +134,7 @@ core::Result<CloudFile> read_text_cloud(const std::filesystem::path& file, Large
   if (is_path(table)) {
     return error(
         "is a path, not a cloud (a stamp, a position and a quaternion in each line); name a cloud or the "
-        "result "
-        "folder");
+        "result folder");
   }
 
   const auto meanings = meanings_of(table);

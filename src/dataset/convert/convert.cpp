@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <fstream>
 #include <optional>
@@ -15,6 +14,7 @@
 #include "images/image_decoders.hpp"
 #include "layout.hpp"
 #include "plumbline/core/output_file.hpp"
+#include "plumbline/core/text.hpp"
 
 namespace plumbline::dataset {
 namespace {
@@ -27,9 +27,7 @@ const std::set<std::string> kNotWritten{".bag", ".db3", ".mcap", ".zip", ".tar",
                                         ".oni", ".klg", ".svo",  ".txt", ".ply", ".pcd", ".yaml"};
 
 core::Result<void> check_folder_name(const fs::path& out) {
-  std::string ending = (out.has_filename() ? out : out.parent_path()).extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = core::ending_of(out.has_filename() ? out : out.parent_path());
   if (kNotWritten.count(ending) == 0) return {};
   return core::usage_error(
       fmt::format("{}: copies are a folder or a file that ends in .mcap; choose another name", out.string()));

@@ -4,13 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <fstream>
 
 #include "frame_images.hpp"
 #include "images/image_decoders.hpp"
 #include "images/image_formats.hpp"
 #include "plumbline/core/output_file.hpp"
+#include "plumbline/core/text.hpp"
 
 namespace plumbline::dataset {
 namespace {
@@ -45,10 +45,7 @@ Decoded decode_other(const Bytes& file) {
 core::Result<StoredImage> stored_file(const std::string& file) {
   auto bytes = read_bytes(file);
   if (!bytes) return tl::unexpected(bytes.error());
-  std::string ending = std::filesystem::path(file).extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return StoredImage{std::move(ending), std::move(*bytes), {}};
+  return StoredImage{core::ending_of(file), std::move(*bytes), {}};
 }
 
 core::Result<cv::Mat> read_image(const std::filesystem::path& file) {

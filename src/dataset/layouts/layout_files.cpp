@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Helpers for the readers of several layouts: numbered images, poses in files of their own.
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <fstream>
 #include <map>
@@ -9,6 +8,7 @@
 
 #include "layout.hpp"
 #include "plumbline/core/numbers.hpp"
+#include "plumbline/core/text.hpp"
 #include "text_lines.hpp"
 
 namespace plumbline::dataset {
@@ -17,9 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 bool is_image(const fs::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string extension = core::ending_of(file);
   for (const char* known : {".png", ".jpg", ".jpeg", ".pgm", ".tif", ".tiff", ".exr", ".npy"}) {
     if (extension == known) return true;
   }

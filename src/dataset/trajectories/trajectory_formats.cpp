@@ -5,11 +5,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <limits>
 
 #include "plumbline/core/numbers.hpp"
+#include "plumbline/core/text.hpp"
 
 namespace plumbline::dataset {
 namespace {
@@ -38,8 +38,8 @@ std::optional<std::size_t> role_of(std::string name) {
 
 /// The columns that a line names; none when it does not name all eight.
 std::optional<TrajectoryColumns> header_of(std::string line) {
-  std::transform(line.begin(), line.end(), line.begin(),
-                 [](unsigned char c) { return c == '#' ? ' ' : static_cast<char>(std::tolower(c)); });
+  line = core::lower(std::move(line));
+  std::replace(line.begin(), line.end(), '#', ' ');
   const bool commas = line.find(',') != std::string::npos;
   const std::vector<std::string> names = split_words(line, commas ? ",;\r\n" : " \t\r\n");
   TrajectoryColumns columns;

@@ -4,11 +4,11 @@
 #include <pcl/point_types.h>
 
 #include <algorithm>
-#include <cctype>
 #include <string>
 
 #include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/cloud/io/ply.hpp"
+#include "plumbline/core/text.hpp"
 #include "plumbline/evaluate/surface.hpp"
 
 namespace plumbline::evaluate {
@@ -61,20 +61,13 @@ core::Result<void> check_reference(const std::filesystem::path& file, const Poin
   return {};
 }
 
-bool is_ply(const std::filesystem::path& file) {
-  std::string ending = file.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return ending == ".ply";
-}
-
 }  // namespace
 
 core::Result<Reference> load_reference(const std::filesystem::path& file) {
   Reference reference;
   reference.name = file.string();
 
-  if (!is_ply(file)) {
+  if (core::ending_of(file) != ".ply") {
     auto samples = load_cloud(file);
     if (!samples) return tl::unexpected(samples.error());
     if (const auto ok = check_reference(file, samples->points); !ok) return tl::unexpected(ok.error());

@@ -5,6 +5,7 @@
 #include "formats.hpp"
 #include "grids/octree.hpp"
 #include "plumbline/core/output_file.hpp"
+#include "plumbline/core/text.hpp"
 
 namespace plumbline::exports {
 namespace {
@@ -19,7 +20,7 @@ core::Result<ExportSummary> write_octomap(MapSource& source, const std::filesyst
 
   OctreeWork work;
   work.resolution_m = source.options().resolution_m > 0.0 ? source.options().resolution_m : kDefault_m;
-  work.color = lower(output.extension().string()) == ".ot";
+  work.color = core::ending_of(output) == ".ot";
   work.frame = source.frame_text();
   work.cloud = *cloud;
   work.box = source.selected();

@@ -11,6 +11,7 @@
 #include "formats.hpp"
 #include "plans/drawing.hpp"
 #include "plans/walls.hpp"
+#include "plumbline/core/text.hpp"
 #include "source/georeference.hpp"
 
 namespace plumbline::exports {
@@ -212,7 +213,7 @@ core::Result<ExportSummary> write_plan(MapSource& source, const std::filesystem:
   if (!reference) return tl::unexpected(reference.error());
 
   const bool section = !source.options().section.empty();
-  const std::string ending = lower(output.extension().string());
+  const std::string ending = core::ending_of(output);
   if (*reference && (ending != ".dxf" || section)) {
     return core::usage_error(
         fmt::format("{}: only a plan as .dxf is moved into world coordinates; leave --datum and "

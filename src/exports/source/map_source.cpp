@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <iterator>
 #include <limits>
@@ -18,6 +17,7 @@
 #include "plumbline/cloud/fusion/dense_fusion.hpp"
 #include "plumbline/cloud/fusion/floor.hpp"
 #include "plumbline/cloud/transform.hpp"
+#include "plumbline/core/text.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/maps/frame_pose.hpp"
 
@@ -32,7 +32,7 @@ bool is_cloud_file(const fs::path& input) {
   std::error_code ec;
   return !fs::is_directory(input, ec) &&
          std::any_of(kEndings.begin(), kEndings.end(),
-                     [&](const char* ending) { return lower(input.extension().string()) == ending; });
+                     [&](const char* ending) { return core::ending_of(input) == ending; });
 }
 
 Eigen::Vector3d position_of(const cloud::Point& point, const cloud::CloudFile& file) {
@@ -98,12 +98,6 @@ geometry::Rigid3 upright_from_map(const cloud::Floor& floor, const geometry::Rig
 }
 
 }  // namespace
-
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
 
 std::vector<double> floor_heights(const cloud::Cloud& cloud) {
   constexpr double kBin_m = 0.05;

@@ -93,9 +93,6 @@ class MapSource {
   double floor_m_ = 0.0;
 };
 
-/// The text in small letters: endings in capitals are accepted.
-std::string lower(std::string text);
-
 /// Heights of the floors, lowest first: wide surfaces that face up. Empty: there is none.
 std::vector<double> floor_heights(const cloud::Cloud& cloud);
 

@@ -5,21 +5,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 
 #include "plumbline/core/numbers.hpp"
+#include "plumbline/core/text.hpp"
 
 namespace plumbline::sensor {
 namespace {
 
 using core::ConfigNode;
-
-std::string lower_case(std::string word) {
-  std::transform(word.begin(), word.end(), word.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return word;
-}
 
 bool add_numbers(const ConfigNode& node, std::vector<double>& numbers) {
   if (node.kind == ConfigNode::Kind::kNull) return true;
@@ -67,7 +61,7 @@ tl::unexpected<core::Error> refuse_camera(const CameraText& text, const CameraFo
 const ConfigNode* find_any(const ConfigNode& map, const std::vector<std::string>& names) {
   for (const std::string& name : names) {
     for (const auto& [key, value] : map.entries) {
-      if (lower_case(key) == name) return &value;
+      if (core::lower(key) == name) return &value;
     }
   }
   return nullptr;
@@ -86,7 +80,7 @@ std::optional<double> number_at(const ConfigNode& map, const std::vector<std::st
 
 std::string word_at(const ConfigNode& map, const std::vector<std::string>& names) {
   const ConfigNode* node = find_any(map, names);
-  return node == nullptr ? "" : lower_case(node->scalar);
+  return node == nullptr ? "" : core::lower(node->scalar);
 }
 
 std::optional<std::vector<double>> numbers_in(const ConfigNode& node) {

@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 
 #include "camera_files/camera_formats.hpp"
 #include "camera_files/text_words.hpp"
 #include "plumbline/core/numbers.hpp"
+#include "plumbline/core/text.hpp"
 
 namespace plumbline::sensor {
 namespace {
@@ -70,10 +70,7 @@ std::string take_colmap(const ColmapModel& model, const std::vector<double>& n, 
   camera.color.cx = n[2 + focals] - kHalfPixel;
   camera.color.cy = n[3 + focals] - kHalfPixel;
   std::vector<double> coefficients(n.begin() + static_cast<std::ptrdiff_t>(4 + focals), n.end());
-  std::string name = model.name;
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return take_coefficients(name, coefficients, camera);
+  return take_coefficients(core::lower(model.name), coefficients, camera);
 }
 
 core::Result<CameraReading> read_colmap(const CameraText& text) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "camera_files/camera_formats.hpp"
+#include "plumbline/core/text.hpp"
 
 namespace plumbline::sensor {
 namespace {
@@ -32,9 +33,8 @@ void find_streams(const core::ConfigNode& node, const std::string& path, RealSen
   if (const auto scale = number_at(node, {"depth_scale", "depth_units"}); scale && !found.depth_scale)
     found.depth_scale = scale;
   for (const auto& [key, value] : node.entries) {
-    std::string below = path + "/";
-    for (const char c : key) below += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    if (value.kind == core::ConfigNode::Kind::kMap) find_streams(value, below, found);
+    if (value.kind != core::ConfigNode::Kind::kMap) continue;
+    find_streams(value, path + "/" + core::lower(key), found);
   }
 }
 

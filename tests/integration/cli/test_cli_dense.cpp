@@ -67,11 +67,6 @@ TEST_F(Dense, KeyframeCloudsLevelsAndTurntable) {
   const cv::Mat first = cv::imread(pictures[0]);
   ASSERT_EQ(first.size(), cv::Size(160, 120));
   EXPECT_GT(cv::norm(first, cv::imread(pictures[1]), cv::NORM_L1), 10000.0);
-
-  write("turn/0003_mine.png", "mine");
-  ASSERT_EQ(run("render out -o turn --turntable 2 --size 160x120 -q").code, 0);
-  EXPECT_TRUE(fs::exists(path("turn/0001.png")) && fs::exists(path("turn/0003_mine.png")));
-  EXPECT_FALSE(fs::exists(path("turn/0002.png"))) << "that of three all round";
 }
 
 TEST_F(Dense, KnownPosesAreTakenAtTheMomentOfTheDepthImage) {
