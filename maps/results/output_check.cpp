@@ -27,9 +27,11 @@ bool is_part_of_result(const fs::path& file) {
   std::error_code ec;
   const fs::path real = fs::weakly_canonical(file, ec);
   if (ec || !fs::exists(real, ec)) return false;
+
   std::string part = real.filename().string();  // the folder or file below `folder`
   fs::path folder = real.parent_path();
   constexpr int kDepth = 3;  // OUT/robots/NAME/trajectory.txt
+
   for (int i = 0; i < kDepth; ++i) {
     const bool result = fs::exists(folder / "summary.json", ec) || fs::exists(folder / "map.db", ec);
     if (result && kPartsOfAResult.count(part) > 0) return true;

@@ -90,6 +90,7 @@ core::Result<void> clear_leftover(const fs::path& partial, bool replace, bool ta
         partial.string()));
   }
   if (takes_over) return {};
+
   const int lock = lock_marker(partial, O_RDONLY);
   if (lock < 0 && !fs::is_empty(partial, ec)) return another_run(partial);
   if (!replace && holds_map(partial)) {

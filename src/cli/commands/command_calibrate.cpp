@@ -155,13 +155,16 @@ core::Result<void> calibrate(const CalibrateRequest& request, Session& session) 
   for (const std::string& input : request.inputs) {
     if (auto added = mapped.add(input, request, session); !added) return added;
   }
+
   const auto calibration =
       mapping::calibrate_camera(mapped.runs(), mapped.camera(), request.options, session.executor());
   if (!calibration) return tl::unexpected<core::Error>(calibration.error());
   if (!session.quiet) print(*calibration);
+
   const auto& findings = calibration->findings;
   const bool any = std::any_of(findings.begin(), findings.end(), [](const auto& f) { return f.used; });
   if (!any && !session.quiet) fmt::print("the given camera fits; nothing better was found\n");
+
   if (request.output.empty()) return {};
   const std::string yaml = "# found by plumbline calibrate\n" + sensor::to_yaml(calibration->camera);
   if (auto written = core::write_file(request.output, yaml); !written) return written;

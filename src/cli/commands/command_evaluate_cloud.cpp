@@ -62,6 +62,7 @@ core::Result<void> write_error_clouds(const evaluate::SurfaceSamples& cloud, con
                                       const std::vector<evaluate::TrajectoryPair>& pairs,
                                       const fs::path& folder) {
   std::vector<geometry::Trajectory> cameras;
+  cameras.reserve(pairs.size());
   for (const evaluate::TrajectoryPair& pair : pairs) cameras.push_back(pair.truth);
   for (geometry::Trajectory& camera : cameras) {
     for (geometry::StampedPose& pose : camera) pose.world_from_camera.translation -= shift;
@@ -72,11 +73,13 @@ core::Result<void> write_error_clouds(const evaluate::SurfaceSamples& cloud, con
   placed.translation += placed.rotation * cloud.shift - shift;
   evaluate::move(placed, moved);
   moved.shift = shift;
+
   if (auto done = write_error_cloud(folder / "accuracy", "Distance of the cloud to the true surface", moved,
                                     report.error_m, cameras);
       !done) {
     return done;
   }
+
   return write_error_cloud(folder / "completeness", "Distance of the true surface to the cloud",
                            {report.reference_samples, report.reference_normals, {}, shift},
                            report.reference_error_m, cameras);

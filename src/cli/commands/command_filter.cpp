@@ -42,11 +42,13 @@ core::Result<void> check_outputs(const FilterRequest& request, const cloud::Filt
   if (extension != ".ply" && extension != ".pcd") {
     return core::usage_error(fmt::format("{}: clouds are written as .ply or .pcd", output.string()));
   }
+
   std::error_code ec;
   const fs::path folder = output.parent_path();
   if (!folder.empty() && !fs::is_directory(folder, ec)) {
     return core::output_error(fmt::format("{}: there is no folder {}", output.string(), folder.string()));
   }
+
   for (const std::string& written : chain.writes()) {
     if (fs::absolute(written).lexically_normal() == fs::absolute(output).lexically_normal()) {
       return core::usage_error(output.string() + ": a filter of the chain writes this file already");

@@ -38,6 +38,7 @@ int map(Session& session, pipeline::MapRequest request, const std::vector<std::s
   request.others.assign(inputs.begin() + 1, inputs.end());
 
   if (auto equipped = session.equip(request); !equipped) return session.fail(equipped.error());
+
   if (request.resume && pipeline::is_finished(request.output)) {
     if (const std::string stopped = stopped_after(request.output); !stopped.empty()) {
       return session.fail({core::ErrorKind::kUsage,
@@ -45,6 +46,7 @@ int map(Session& session, pipeline::MapRequest request, const std::vector<std::s
                                        "and add --force to map again",
                                        request.output.string(), stopped)});
     }
+
     if (!session.quiet) {
       fmt::print(
           "{}: is finished; there is nothing to continue; to map again, with other options too, leave "

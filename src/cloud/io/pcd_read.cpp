@@ -228,8 +228,10 @@ std::string read_ascii(ByteReader& reader, const PcdHeader& header, CloudBuilder
 
       for (std::uint64_t k = 0; k < field.count; ++k) {
         if (!words.next(word)) return truncated(row, header.points);
+
         if (words.decimal_comma())
           return fmt::format("point {}: decimal comma; write numbers with a point", row + 1);
+
         const auto value = parse_number(word);
         if (!value) return fmt::format("point {}: '{}' is not a number", row + 1, word);
 

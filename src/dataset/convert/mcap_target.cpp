@@ -77,6 +77,7 @@ class McapTarget final : public CopyTarget {
     auto depth = pixels_of(pair.depth);
     if (!depth) return tl::unexpected(depth.error());
     if (!begun_) begin(color_ns);
+
     const MessageHeader header{color_ns, kColorFrame};
     const auto size = write_color(header, pair.color);
     if (!size) return tl::unexpected(size.error());

@@ -115,9 +115,11 @@ bool is_part_of_recording(const fs::path& file) {
   std::error_code ec;
   const fs::path real = fs::weakly_canonical(file, ec);
   if (ec || !fs::exists(real, ec)) return false;
+
   std::string part = real.filename().string();  // the folder or file below `folder`
   fs::path folder = real.parent_path();
   constexpr int kDepth = 3;
+
   for (int i = 0; i < kDepth; ++i) {
     if (const LayoutFormat* format = layout_of(folder)) {
       std::vector<std::string> names{
@@ -127,6 +129,7 @@ bool is_part_of_recording(const fs::path& file) {
       }
       if (std::find(names.begin(), names.end(), part) != names.end()) return true;
     }
+
     part = folder.filename().string();
     folder = folder.parent_path();
   }
