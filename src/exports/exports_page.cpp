@@ -28,7 +28,7 @@ plumbline export out/room -o colmap                          # a COLMAP model wi
 plumbline export out/room -o room.las --voxel "2 cm"         # for surveyors' programs
 plumbline export out/room -o room.glb --mesh                 # for a browser
 plumbline export out/room -o path.csv --what trajectory      # the path in EuRoC's format
-plumbline export out/room -o ground.ply --z 0,2m             # up to 2 m over the floor
+plumbline export out/room -o open.ply --z 0,2m               # without the ceiling: up to 2 m over the floor
 ```
 
 )";
