@@ -121,7 +121,7 @@ std::string facts(const ReportData& data) {
                      {"Pipeline", text_at(s, "/pipeline")},
                      {"Frame of the results", frame_of_results(data)},
                      {"Landmarks", filled(s, "{/landmarks/points} points, {/landmarks/lines} lines")},
-                     {"Threads, seed", filled(s, "{/timing/threads}, {/seed}")},
+                     {"Threads", filled(s, "{/timing/threads}")},
                      {"Version", "plumbline " + text_at(s, "/version")}});
 }
 
