@@ -12,6 +12,7 @@
 #include "app.hpp"
 #include "plumbline/cloud/columns.hpp"
 #include "plumbline/cloud/filters/filter_chain.hpp"
+#include "plumbline/cloud/filters/filter_plugin.hpp"
 #include "plumbline/core/text.hpp"
 #include "plumbline/maps/output_check.hpp"
 
@@ -154,7 +155,7 @@ core::Result<void> describe_filter(const std::string& name, const Session& sessi
   const cloud::FilterInfo* info = registry->find(name);
   if (info == nullptr) {
     return core::usage_error(
-        fmt::format("there is no filter '{}'{}", name, core::hint(name, registry->types())));
+        fmt::format("there is no filter '{}'{}", name, cloud::missing_filter_hint(name, *registry)));
   }
 
   fmt::print("{}: {}\n\n{}\n\noptions:\n", info->type, info->summary, info->details);

@@ -9,6 +9,7 @@
 
 #include "filters/filter_tools.hpp"
 #include "plumbline/cloud/columns.hpp"
+#include "plumbline/cloud/filters/filter_plugin.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -62,7 +63,7 @@ const FilterInfo* find_type(const ConfigNode& entry, const std::string& path, co
                         type->scalar == "range"
                             ? kNoRange
                             : fmt::format("'{}' is not a filter{}", type->scalar.substr(0, 40),
-                                          core::hint(type->scalar, registry.types()))});
+                                          missing_filter_hint(type->scalar, registry))});
     return nullptr;
   }
 

@@ -77,4 +77,9 @@ core::Result<void> load_filter_plugin(const std::filesystem::path& file, FilterR
   return {};
 }
 
+std::string missing_filter_hint(const std::string& type, const FilterRegistry& registry) {
+  return core::hint(type, registry.types()) +
+         "; filters of your own are loaded by the program's --plugin FILE.so";
+}
+
 }  // namespace plumbline::cloud

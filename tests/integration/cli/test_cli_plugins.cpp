@@ -38,6 +38,9 @@ TEST_F(Plugins, AFilterIsListedDescribedCheckedAndRun) {
   const auto without = run("filters check chain.yaml");
   EXPECT_EQ(without.code, 2);
   EXPECT_TRUE(without.told("chain.yaml:3:12: filters[0].type: 'grey'")) << without;
+  EXPECT_TRUE(without.told("; filters of your own are loaded by the program's --plugin FILE.so")) << without;
+  EXPECT_TRUE(run("filters describe grey")
+                  .told("; filters of your own are loaded by the program's --plugin FILE.so"));
   const auto ran = run("filter chain.yaml cloud.xyz out.pcd" + plugin("grey"));
   EXPECT_EQ(ran.code, 0) << ran;
   EXPECT_NE(ran.out.find("grey"), std::string::npos) << ran;
@@ -87,6 +90,7 @@ TEST_F(Plugins, APipelineUsesThem) {
   const auto without = run(command);
   EXPECT_EQ(without.code, 2) << without;
   EXPECT_TRUE(without.told("'grey' is not a filter")) << without;
+  EXPECT_TRUE(without.told("; filters of your own are loaded by the program's --plugin FILE.so")) << without;
   const auto mapped = run(command + plugin("grey"));
   EXPECT_TRUE(mapped.code == 0 || mapped.code == 4) << mapped;  // six frames are few
   const auto map = cloud::read_cloud(path("out/map.ply"));

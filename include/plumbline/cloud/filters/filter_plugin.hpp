@@ -56,6 +56,9 @@ inline std::string plugin_toolchain() {
 /// already; the registry is then as it was. Loading runs the file's code: only load files that you trust.
 core::Result<void> load_filter_plugin(const std::filesystem::path& file, FilterRegistry& registry);
 
+/// End of a message that a registry has no such filter: similar or allowed names, and the way to add one.
+std::string missing_filter_hint(const std::string& type, const FilterRegistry& registry);
+
 }  // namespace plumbline::cloud
 
 /// Followed by the body of a function that adds filters to `registry`.
