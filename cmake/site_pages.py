@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Gathers the pages of the site: site_pages.py ROOT OUT VERSION writes OUT/mkdocs.yml and OUT/pages.
+"""Gathers the pages for a site or a package: site_pages.py ROOT OUT [VERSION] writes OUT/pages, with VERSION OUT/mkdocs.yml, too.
 
 Pages keep their places below ROOT, so that their links hold. Files that pages link to come along; a folder that they link to
-becomes a page that lists it. The order of the pages is that of docs/README.md.
+and that has no README.md becomes a page that lists it. The order of the pages is that of docs/README.md.
 """
 import json
 import re
@@ -45,14 +45,18 @@ def copy_page(root, page, pages):
             if not (linked / "README.md").exists():
                 list_folder(root, linked, pages)
             target = target.rstrip("/") + "/README.md"
-        elif linked.suffix != ".md":
-            place = pages / linked.relative_to(root)
+            linked = linked / "README.md"
+        place = pages / linked.relative_to(root)
+        if not place.exists() and linked.suffix == ".md":
+            copy_page(root, linked, pages)
+        elif not place.exists():
             place.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(linked, place)
         return match.group(1) + target + (match.group(3) or "") + match.group(4)
 
     place = pages / page.relative_to(root)
     place.parent.mkdir(parents=True, exist_ok=True)
+    place.touch()  # pages that link to each other are not copied again
     place.write_text(LINK.sub(follow, page.read_text()))
 
 
@@ -71,13 +75,16 @@ def navigation(root):
     return nav + [{"Notes": listed}, {"Limits": "docs/limits.md"}, {"Project": others}]
 
 
-def main(root, out, version):
-    shutil.rmtree(out, ignore_errors=True)
-    pages = out / "pages"
+def gather(root, pages):
     pages.mkdir(parents=True)
     for page in [root / name for name in TOP] + sorted((root / "docs").rglob("*.md")):
-        copy_page(root, page, pages)
-    shutil.copy(root / "LICENSE", pages / "LICENSE")
+        if not (pages / page.relative_to(root)).exists():
+            copy_page(root, page, pages)
+    for name in ("LICENSE", "CITATION.cff"):
+        shutil.copy(root / name, pages / name)
+
+
+def write_settings(root, out, version):
     settings = {
         "site_name": f"Plumbline {version}",
         "site_description": "RGB-D recordings in, one dense metric point cloud out",
@@ -90,8 +97,15 @@ def main(root, out, version):
         "nav": navigation(root),
     }
     (out / "mkdocs.yml").write_text(json.dumps(settings, indent=1))  # JSON is YAML
+
+
+def main(root, out, version=None):
+    shutil.rmtree(out, ignore_errors=True)
+    gather(root, out / "pages")
+    if version is not None:
+        write_settings(root, out, version)
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve(), sys.argv[3]))
+    sys.exit(main(*(Path(folder).resolve() for folder in sys.argv[1:3]), *sys.argv[3:]))
