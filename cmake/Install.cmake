@@ -13,8 +13,10 @@ install(TARGETS plumbline_pcl plumbline_offscreen EXPORT plumbline COMPONENT dev
 install(EXPORT plumbline NAMESPACE plumbline:: DESTINATION ${package_folder} FILE plumblineTargets.cmake
         COMPONENT dev)
 
+set(program ${CMAKE_INSTALL_BINDIR}/plumbline)
+set(pipelines ${CMAKE_INSTALL_DATADIR}/plumbline/pipelines)
 configure_package_config_file(cmake/plumblineConfig.cmake.in ${PROJECT_BINARY_DIR}/plumblineConfig.cmake
-                              INSTALL_DESTINATION ${package_folder} NO_SET_AND_CHECK_MACRO)
+                              INSTALL_DESTINATION ${package_folder} PATH_VARS program pipelines NO_SET_AND_CHECK_MACRO)
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/plumblineConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/plumblineConfig.cmake ${PROJECT_BINARY_DIR}/plumblineConfigVersion.cmake
         DESTINATION ${package_folder} COMPONENT dev)

@@ -14,8 +14,9 @@ function(plumbline_module name)
     add_library(plumbline_${name} STATIC ${sources})
     target_include_directories(plumbline_${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
                                $<INSTALL_INTERFACE:include> PRIVATE ${CMAKE_CURRENT_SOURCE_DIR})
-    target_link_libraries(plumbline_${name} PUBLIC ${ARG_DEPENDS} ${ARG_LINK}
-                          PRIVATE ${ARG_PRIVATE_LINK} $<BUILD_INTERFACE:plumbline_warnings>)
+    # Not linked: an installed target would name it, with nothing behind the name.
+    target_compile_options(plumbline_${name} PRIVATE $<TARGET_PROPERTY:plumbline_warnings,INTERFACE_COMPILE_OPTIONS>)
+    target_link_libraries(plumbline_${name} PUBLIC ${ARG_DEPENDS} ${ARG_LINK} PRIVATE ${ARG_PRIVATE_LINK})
     if(ARG_PCH)
       target_precompile_headers(plumbline_${name} PRIVATE ${ARG_PCH})
     elseif(ARG_PCH_FROM)
