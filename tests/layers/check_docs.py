@@ -20,7 +20,7 @@ BLOCK = re.compile(r"^```[a-z]*\n(.*?)^```", re.S | re.M)
 
 
 def pages(root):
-    return sorted(root.glob("*.md")) + sorted((root / "docs").rglob("*.md"))
+    return sorted(root.glob("*.md")) + sorted((root / "docs").rglob("*.md")) + sorted((root / "examples").rglob("*.md"))
 
 
 def anchors(page):

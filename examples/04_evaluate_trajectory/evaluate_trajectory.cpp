@@ -1,19 +1,29 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Measures a trajectory against the truth that comes with a recording.
 //
-//   04_evaluate_trajectory TRAJECTORY.txt INPUT PIPELINES
+//   evaluate_trajectory TRAJECTORY.txt INPUT PIPELINES
 #include <cstdio>
 
-#include "example.hpp"
+#include "plumbline/core/error.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/evaluate/trajectory.hpp"
 #include "plumbline/pipeline/input.hpp"
 
 using namespace plumbline;
 
+namespace {
+
+/// Prints the message; returns the exit code that the program uses for this kind of error.
+int fail(const core::Error& error) {
+  std::fprintf(stderr, "%s\n", error.message.c_str());
+  return static_cast<int>(error.kind);
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
   if (argc != 4) {
-    std::fprintf(stderr, "usage: 04_evaluate_trajectory TRAJECTORY.txt INPUT PIPELINES\n");
+    std::fprintf(stderr, "usage: evaluate_trajectory TRAJECTORY.txt INPUT PIPELINES\n");
     return 2;
   }
 

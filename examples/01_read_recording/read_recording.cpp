@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Opens a recording, whatever its layout, and reads it frame by frame.
 //
-//   01_read_recording INPUT PIPELINES
+//   read_recording INPUT PIPELINES
 //
 // INPUT: a TUM, 7-Scenes or Redwood folder, or a world to be filmed such as "synth:room?frames=25".
 // PIPELINES: the shipped pipelines/ folder, for its cameras and scenes.
@@ -14,7 +14,7 @@ using namespace plumbline;
 
 int main(int argc, char** argv) {
   if (argc != 3) {
-    std::fprintf(stderr, "usage: 01_read_recording INPUT PIPELINES\n");
+    std::fprintf(stderr, "usage: read_recording INPUT PIPELINES\n");
     return 2;
   }
 

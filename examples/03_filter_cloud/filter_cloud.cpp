@@ -1,26 +1,36 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // One frame as a cloud with colour and normals, through a chain of filters, into a file.
 //
-//   03_filter_cloud INPUT PIPELINES CHAIN.yaml CLOUD.ply|CLOUD.pcd
+//   filter_cloud INPUT PIPELINES CHAIN.yaml CLOUD.ply|CLOUD.pcd
 //
-// 03_filter_cloud.yaml beside this file is such a chain.
+// near.yaml beside this file is such a chain.
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
 #include <cstdio>
 #include <vector>
 
-#include "example.hpp"
 #include "plumbline/cloud/filters/filter_chain.hpp"
 #include "plumbline/cloud/fusion/keyframe_cloud.hpp"
 #include "plumbline/cloud/io/cloud_io.hpp"
+#include "plumbline/core/error.hpp"
 #include "plumbline/pipeline/input.hpp"
 
 using namespace plumbline;
 
+namespace {
+
+/// Prints the message; returns the exit code that the program uses for this kind of error.
+int fail(const core::Error& error) {
+  std::fprintf(stderr, "%s\n", error.message.c_str());
+  return static_cast<int>(error.kind);
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
   if (argc != 5) {
-    std::fprintf(stderr, "usage: 03_filter_cloud INPUT PIPELINES CHAIN.yaml CLOUD.ply\n");
+    std::fprintf(stderr, "usage: filter_cloud INPUT PIPELINES CHAIN.yaml CLOUD.ply\n");
     return 2;
   }
 

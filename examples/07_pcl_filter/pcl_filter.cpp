@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Plumbline's filters in a program of PCL's, without any pipeline: they are used as pcl::PassThrough is.
 //
-//   07_pcl_filter
+//   pcl_filter
 //
 // A depth camera looks at a box in front of a wall, on a floor; the pixels at the box's border hang in the
 // air. Prints what each filter leaves of the picture.

@@ -1,23 +1,33 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Fuses frames at known poses in a voxel map and draws the result; no display is needed.
 //
-//   05_fuse_and_draw INPUT PIPELINES PICTURE.png
+//   fuse_and_draw INPUT PIPELINES PICTURE.png
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
 #include <cstdio>
 
-#include "example.hpp"
 #include "plumbline/cloud/fusion/keyframe_cloud.hpp"
 #include "plumbline/cloud/fusion/voxel_map.hpp"
+#include "plumbline/core/error.hpp"
 #include "plumbline/pipeline/input.hpp"
 #include "plumbline/viz/snapshot.hpp"
 
 using namespace plumbline;
 
+namespace {
+
+/// Prints the message; returns the exit code that the program uses for this kind of error.
+int fail(const core::Error& error) {
+  std::fprintf(stderr, "%s\n", error.message.c_str());
+  return static_cast<int>(error.kind);
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
   if (argc != 4) {
-    std::fprintf(stderr, "usage: 05_fuse_and_draw INPUT PIPELINES PICTURE.png\n");
+    std::fprintf(stderr, "usage: fuse_and_draw INPUT PIPELINES PICTURE.png\n");
     return 2;
   }
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Follows the camera through a recording: points and lines of each frame, then SLAM.
 //
-//   02_track_camera INPUT PIPELINES TRAJECTORY.txt
+//   track_camera INPUT PIPELINES TRAJECTORY.txt
 //
 // The same as the stages `features` and `track` of pipelines/rgbd.yaml, as plain calls.
 #include <cstdio>
 #include <memory>
 
-#include "example.hpp"
+#include "plumbline/core/error.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/features/frame_features.hpp"
 #include "plumbline/mapping/slam.hpp"
@@ -15,9 +15,19 @@
 
 using namespace plumbline;
 
+namespace {
+
+/// Prints the message; returns the exit code that the program uses for this kind of error.
+int fail(const core::Error& error) {
+  std::fprintf(stderr, "%s\n", error.message.c_str());
+  return static_cast<int>(error.kind);
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
   if (argc != 4) {
-    std::fprintf(stderr, "usage: 02_track_camera INPUT PIPELINES TRAJECTORY.txt\n");
+    std::fprintf(stderr, "usage: track_camera INPUT PIPELINES TRAJECTORY.txt\n");
     return 2;
   }
 

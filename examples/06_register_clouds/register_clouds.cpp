@@ -2,7 +2,7 @@
 // Two views of one place registered with PCL's loop: voxel-filtered surfaces, correspondences both ways, and
 // steps in the directions that the surfaces hold. These classes work in any program that uses PCL.
 //
-//   06_register_clouds INPUT PIPELINES FRAME
+//   register_clouds INPUT PIPELINES FRAME
 //
 // Registers the depth image of frame 0 with that of FRAME, from a start that is 3 cm and 1 degree off, and
 // prints how far the result is from the truth.
@@ -13,10 +13,10 @@
 #include <cstdlib>
 #include <optional>
 
-#include "example.hpp"
 #include "plumbline/cloud/fusion/keyframe_cloud.hpp"
 #include "plumbline/cloud/registration/constrained_point_to_plane.hpp"
 #include "plumbline/cloud/registration/two_way_correspondences.hpp"
+#include "plumbline/core/error.hpp"
 #include "plumbline/pipeline/input.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 
@@ -45,11 +45,17 @@ pcl::Indices every(const cloud::SurfaceSearch& surface, std::size_t step) {
   return indices;
 }
 
+/// Prints the message; returns the exit code that the program uses for this kind of error.
+int fail(const core::Error& error) {
+  std::fprintf(stderr, "%s\n", error.message.c_str());
+  return static_cast<int>(error.kind);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   if (argc != 4) {
-    std::fprintf(stderr, "usage: 06_register_clouds INPUT PIPELINES FRAME\n");
+    std::fprintf(stderr, "usage: register_clouds INPUT PIPELINES FRAME\n");
     return 2;
   }
 
