@@ -70,8 +70,8 @@ set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "plumbline (${this_version}), python3-nu
 set(CPACK_DEBIAN_DEV_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_DOC_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_DOC_PACKAGE_ARCHITECTURE all)
-# What cmake/plumblineConfig.cmake.in looks for.
-set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "plumbline (${this_version}), libpcl-dev, libopencv-dev, libopencv-contrib-dev, libeigen3-dev, libceres-dev, libtbb-dev, libyaml-cpp-dev, libspdlog-dev, libfmt-dev, nlohmann-json3-dev, libexpected-dev, libembree-dev, libnanoflann-dev, robin-map-dev, libsqlite3-dev, libzstd-dev, liblz4-dev, libdeflate-dev, libjpeg-dev")
+# What the public headers include and cmake/plumblineConfig.cmake.in finds; tests/packaging compares.
+set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "plumbline (${this_version}), libpcl-dev, libopencv-dev, libopencv-contrib-dev, libeigen3-dev, libceres-dev, libtbb-dev, libyaml-cpp-dev, libspdlog-dev, libfmt-dev, nlohmann-json3-dev, libexpected-dev, libembree-dev, robin-map-dev, libsqlitecpp-dev, libzstd-dev, liblz4-dev, libdeflate-dev, libjpeg-dev")
 if(PLUMBLINE_PYTHON_VERSION MATCHES "^([0-9]+)\\.([0-9]+)") # the compiled part is for this one alone
   math(EXPR next_minor "${CMAKE_MATCH_2} + 1")
   string(APPEND CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS ", python3 (>= ${CMAKE_MATCH_1}.${CMAKE_MATCH_2}), python3 (<< ${CMAKE_MATCH_1}.${next_minor})")
@@ -85,9 +85,12 @@ install(FILES ${PROJECT_SOURCE_DIR}/scripts/plumbline-hub.service DESTINATION li
 set(CPACK_DEBIAN_NET_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/scripts/packaging/net/postinst
     ${PROJECT_SOURCE_DIR}/scripts/packaging/net/prerm ${PROJECT_SOURCE_DIR}/scripts/packaging/net/postrm)
 
-# Pages and examples.
-install(DIRECTORY docs DESTINATION share/doc/plumbline-doc COMPONENT doc EXCLUDE_FROM_ALL)
-install(DIRECTORY examples DESTINATION share/doc/plumbline-doc COMPONENT doc EXCLUDE_FROM_ALL)
+# Pages with all that they link to, and examples. Docs.cmake has found Python.
+install(CODE "execute_process(COMMAND \"${Python3_EXECUTABLE}\" -B \"${PROJECT_SOURCE_DIR}/cmake/site_pages.py\"
+                \"${PROJECT_SOURCE_DIR}\" \"${PROJECT_BINARY_DIR}/package_files/doc\" COMMAND_ERROR_IS_FATAL ANY)"
+        COMPONENT doc EXCLUDE_FROM_ALL)
+install(DIRECTORY ${PROJECT_BINARY_DIR}/package_files/doc/pages/ DESTINATION share/doc/plumbline-doc COMPONENT doc EXCLUDE_FROM_ALL)
+install(DIRECTORY examples DESTINATION share/doc/plumbline-doc COMPONENT doc EXCLUDE_FROM_ALL USE_SOURCE_PERMISSIONS)
 
 # copyright and changelog.Debian.gz, once for all.
 configure_file(cmake/copyright.in ${PROJECT_BINARY_DIR}/package_files/copyright @ONLY)

@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The packages, made and tried: run_packages.py ROOT BUILD WORK packages|root|image|service
 
-packages  makes them of what is built, and has lintian look at them
+packages  makes them of what is built, follows the links of the installed pages, compares what the CMake package finds with
+          the dependencies of the -dev package, and has lintian look at them
 image     the steps of the Dockerfile's last stage, in such a root: no Docker engine is needed
-root      installs them with apt in a minimal Debian root of their own, maps, draws, reports, builds a project that finds
-          the library, runs Python, upgrades from a lower version, removes all; nothing may be left
+root      installs them with apt in a minimal Debian root of their own, maps, draws, reports, runs Python, builds and runs a
+          project that finds the library and the examples, upgrades from a lower version, removes all; nothing may be left
 service   what systemd says of the hub's unit
 
 Exit code 77 where lintian, mmdebstrap, the right to make a root, or the network to fill it are not there.
@@ -18,6 +19,9 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "layers"))
+import check_docs
 
 SKIPPED = 77
 SUITE = "bookworm"
@@ -54,8 +58,63 @@ def make(build):
     assert not missing, f"packages that are not made: {missing}"
 
 
-def check_packages(_root, build, _work):
+def unpacked(build, work, *names):
+    """A folder with the files of these packages."""
+    shutil.rmtree(work, ignore_errors=True)
+    work.mkdir(parents=True)
+    for deb in packages(build):
+        if deb.name.split("_")[0] in names:
+            run("dpkg-deb", "-x", deb, work)
+    return work
+
+
+def check_pages(build, work):
+    """Links of the installed pages lead somewhere."""
+    pages = unpacked(build, work / "doc", "plumbline-doc") / "usr/share/doc/plumbline-doc"
+    problems = check_docs.check_links(pages)
+    assert len(check_docs.pages(pages)) > 40 and not problems, "\n".join(problems)
+
+
+def names_of(depends):
+    """Names of a Depends field; of alternatives all."""
+    return [re.split(r"[ (:]", name.strip())[0] for name in re.split(r"[,|]", depends) if name.strip()]
+
+
+def closure(names):
+    """These packages, what they provide, and all that they depend on, as far as it is installed here."""
+    said = run("dpkg-query", "-W", "-f", "${Package}\t${Provides}\t${Pre-Depends}, ${Depends}\n", stdout=subprocess.PIPE).stdout
+    needs, providers = {}, {}
+    for package, provides, depends in (line.split("\t") for line in said.splitlines()):
+        needs[package] = names_of(depends)
+        for name in [package, *names_of(provides)]:
+            providers.setdefault(name, set()).add(package)
+    found, left = set(), list(names)
+    while left:
+        for package in providers.get(left.pop(), set()) - found:
+            found.add(package)
+            left += needs[package]
+    return found
+
+
+def check_development(root, build, work):
+    """The package of the library depends on all that its CMake package finds."""
+    prefix = unpacked(build, work / "dev", DEVELOPMENT, "plumbline") / "usr"
+    run("cmake", "-S", root / "tests" / "consumer", "-B", work / "consumer", "-G", "Ninja", f"-DCMAKE_PREFIX_PATH={prefix}",
+        stdout=subprocess.DEVNULL)
+    files = (work / "consumer" / "interface_files.txt").read_text().split()
+    [deb] = (build / "packages").glob(DEVELOPMENT + "_*.deb")
+    depends = run("dpkg-deb", "-f", deb, "Depends", stdout=subprocess.PIPE).stdout
+    known = closure(names_of(depends))
+    said = subprocess.run(["dpkg", "-S", *files], text=True, capture_output=True).stdout
+    owners = {file: set(names_of(names)) for names, file in (line.split(": ", 1) for line in said.splitlines())}
+    missing = {file: sorted(owners.get(file, [])) for file in files if not owners.get(file, set()) & known}
+    assert len(files) > 20 and not missing, f"{DEVELOPMENT} does not depend on the packages of {missing}"
+
+
+def check_packages(root, build, work):
     make(build)
+    check_pages(build, work)
+    check_development(root, build, work)
     for deb in packages(build):
         depends = subprocess.run(["dpkg-deb", "-f", deb, "Depends"], capture_output=True, text=True, check=True).stdout
         print(f"{deb.name}: {deb.stat().st_size / 1e6:.2f} MB; {depends.strip()}")
@@ -137,12 +196,30 @@ grep -q "install the package plumbline-net" /tmp/said
 plumbline convert /tmp/nothing.mcap /tmp/copy 2>&1 | tee /tmp/said || true
 """
 PYTHON = """
-python3 /usr/share/doc/plumbline-doc/examples/python/map_folder.py "synth:room?frames=30&width=320&height=240" /tmp/python
+python3 /packages/run_examples.py /usr/share/doc/plumbline-doc/examples/python plumbline /tmp/python
 """
-CONSUMER = """
-cmake -S /packages/consumer -B /tmp/consumer -G Ninja -DCMAKE_BUILD_TYPE=Debug >/dev/null
+NETWORK = """
+/usr/share/doc/plumbline-doc/examples/network/two_robots.sh $(command -v plumbline) /tmp/network 212
+"""
+# The quickest to compile.
+CMAKE = "cmake -G Ninja -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-O0"
+CONSUMER = f"""
+{CMAKE} -S /packages/consumer -B /tmp/consumer >/dev/null
 cmake --build /tmp/consumer >/dev/null
 mkdir -p /tmp/consumed && /tmp/consumer/consumer /tmp/consumed
+/tmp/consumer/map_world /tmp/consumed/world /usr/share/plumbline/pipelines
+"""
+# All at once, and one of them copied and alone.
+EXAMPLES = f"""
+examples=/usr/share/doc/plumbline-doc/examples
+{CMAKE} -S $examples -B /tmp/examples >/dev/null
+cmake --build /tmp/examples >/dev/null
+ctest --test-dir /tmp/examples --parallel 2 --output-on-failure
+test $(ls $examples/*/CMakeLists.txt | wc -l) = $(ctest --test-dir /tmp/examples -N | grep -c "Test *#")
+cp -r $examples/01_read_recording /tmp/alone
+{CMAKE} -S /tmp/alone -B /tmp/alone/build >/dev/null
+cmake --build /tmp/alone/build >/dev/null
+ctest --test-dir /tmp/alone/build --output-on-failure --no-tests=error
 """
 
 
@@ -180,10 +257,16 @@ def try_demo(root, build, debian):
 
 
 def try_consumer(root, debian):
-    """A project of its own finds the library."""
+    """A project of its own finds the library, and so do the examples."""
     shutil.copytree(root / "tests" / "consumer", debian.folder / "packages" / "consumer")
-    debian.apt("install -y -qq /packages/libplumbline-dev_*.deb g++ cmake ninja-build pkg-config")
+    begin = time.monotonic()
+    debian.apt("install -y -qq /packages/libplumbline-dev_*.deb g++ cmake ninja-build")
+    installed = time.monotonic()
     debian.run(CONSUMER)
+    consumed = time.monotonic()
+    debian.run(EXAMPLES)
+    print(f"{DEVELOPMENT} installed in {installed - begin:.0f} s, consumer {consumed - installed:.0f} s, "
+          f"examples {time.monotonic() - consumed:.0f} s")
 
 
 def try_packages(root, build, work, debian):
@@ -208,14 +291,16 @@ def try_packages(root, build, work, debian):
     debian.apt("install -y -qq --allow-downgrades /packages/lower/*.deb")
     debian.apt(f"install -y -qq $(ls /packages/*.deb | grep -v {DEVELOPMENT})")
     debian.run("dpkg-query -W -f '${Version}\\n' plumbline plumbline-net python3-plumbline | { ! grep before; }")
+    shutil.copy(root / "tests" / "python" / "run_examples.py", debian.folder / "packages")
     debian.run(PYTHON)
+    debian.run(NETWORK)
     with_consumer = space_for(CONSUMER_GB, work)
     if with_consumer:
         try_consumer(root, debian)
     debian.run("man -w plumbline-map >/dev/null 2>&1 || test -e /usr/share/man/man1/plumbline-map.1.gz || "
                "echo 'man pages are left out of this root by its dpkg settings'")
 
-    wanted = " ".join([*PACKAGES, "g++", "cmake", "ninja-build", "pkg-config"])
+    wanted = " ".join([*PACKAGES, "g++", "cmake", "ninja-build"])
     debian.apt(f"purge -y -qq --autoremove $(dpkg-query -W -f '${{Package}} ' {wanted} 2>/dev/null)")
     left = sorted(file for file in debian.files() - before if "plumbline" in file)
     assert not left, f"left behind after the removal: {left}"
