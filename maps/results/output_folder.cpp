@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/maps/output_folder.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include <fstream>
 #include <system_error>
 #include <utility>
+
+#include "results/folder_marker.hpp"
 
 namespace plumbline::maps {
 namespace {
@@ -16,15 +18,13 @@ namespace fs = std::filesystem;
 
 constexpr std::uintmax_t kMegabyte = 1'000'000;
 constexpr std::uintmax_t kLeastFreeMb = 64;
-/// File in every OUT.partial, locked by its run: it distinguishes the remains of an interrupted run from
-/// anything else, and from a run that is still active.
-const char* const kMarker = ".plumbline-unfinished";
 
 fs::path with_ending(const fs::path& folder, const char* ending) {
   fs::path path = folder;
   path += ending;
   return path;
 }
+fs::path replaced_of(const fs::path& target) { return with_ending(target, ".replaced"); }
 
 /// Absolute, without "." or a trailing slash, links followed: what can be renamed.
 fs::path normal(const fs::path& out) {
@@ -34,16 +34,22 @@ fs::path normal(const fs::path& out) {
   return path.has_filename() ? path : path.parent_path();
 }
 
-core::Result<void> check_target(const fs::path& target, bool replace, OutputFolder::IsEarlier is_earlier) {
+bool is_there(const fs::path& folder) {
   std::error_code ec;
-  if (!fs::exists(target, ec)) return {};
+  return fs::exists(fs::symlink_status(folder, ec)) &&
+         !(fs::is_directory(folder, ec) && fs::is_empty(folder, ec));
+}
+
+/// Checks that nothing is at the target, or what may be replaced.
+core::Result<void> check_target(const fs::path& target, bool replace, const FolderKind& kind) {
+  std::error_code ec;
+  if (!is_there(target)) return {};
   if (!fs::is_directory(target, ec)) {
     return core::usage_error(
         fmt::format("{}: is a file; name a folder that does not exist yet", target.string()));
   }
 
-  if (fs::is_empty(target, ec)) return {};
-  if (!is_earlier(target)) {
+  if (!kind.is_earlier(target)) {
     return core::usage_error(fmt::format(
         "{}: exists, is not empty and is not an earlier result; name a folder that does not exist "
         "yet (only earlier results are ever replaced)",
@@ -55,21 +61,40 @@ core::Result<void> check_target(const fs::path& target, bool replace, OutputFold
         "{}: holds an earlier result; name another folder or add --force to replace it", target.string()));
   }
 
-  return {};
+  const auto foreign = core::foreign_files(target, files_of(target, kind));
+  if (foreign.empty()) return {};
+  return core::usage_error(
+      fmt::format("{}: holds files that are not of the earlier result and would be lost with it: {}; move "
+                  "them elsewhere, or name another folder",
+                  target.string(), core::list_of_files(foreign)));
 }
 
-/// Descriptor of the locked marker, -1 when it cannot be had.
-int lock_marker(const fs::path& partial, int flags) {
-  const int descriptor = open((partial / kMarker).c_str(), flags | O_CLOEXEC, 0644);
-  if (descriptor < 0) return -1;
-  if (flock(descriptor, LOCK_EX | LOCK_NB) == 0) return descriptor;
-  close(descriptor);
-  return -1;
+/// Checks that the earlier result at `target` can be moved to OUT.replaced.
+core::Result<void> check_replaced(const fs::path& target, const FolderKind& kind) {
+  const fs::path old = replaced_of(target);
+  if (!is_there(target) || !is_there(old) || is_replaced(old, kind)) return {};
+  return core::usage_error(
+      fmt::format("{}: is in the way: the earlier result waits there while it is replaced; move it elsewhere",
+                  old.string()));
 }
 
 tl::unexpected<core::Error> another_run(const fs::path& partial) {
   return core::usage_error(
       fmt::format("{}: another run is writing there; wait or name another output folder", partial.string()));
+}
+
+/// Locks the OUT.partial of an earlier run, if it has a marker. Error: another run is active, or the folder
+/// is somebody else's.
+core::Result<FileLock> lock_leftover(const fs::path& partial, const FolderKind& kind) {
+  if (!is_there(partial)) return FileLock();
+  FileLock lock = lock_marker(partial, false);
+  if (!lock && has_marker(partial)) return another_run(partial);
+  if (!lock && !kind.is_earlier(partial)) {
+    return core::usage_error(fmt::format(
+        "{}: is in the way: results are first written there; move it or name another output folder",
+        partial.string()));
+  }
+  return lock;
 }
 
 /// True if an interrupted run has left a map, or a hub those of robots.
@@ -79,55 +104,79 @@ bool holds_map(const fs::path& partial) {
   return fs::exists(partial / "map.db", ec) || (fs::is_directory(robots, ec) && !fs::is_empty(robots, ec));
 }
 
-/// Removes the remains of an interrupted run, and nothing else; its map only with `replace`. With
-/// `takes_over` only checks that they are such.
-core::Result<void> clear_leftover(const fs::path& partial, bool replace, bool takes_over) {
-  std::error_code ec;
-  if (!fs::exists(partial, ec)) return {};
-  if (!fs::is_empty(partial, ec) && !fs::exists(partial / kMarker, ec)) {
+/// Removes the remains of an interrupted run, and nothing else; its map or complete result only with
+/// `replace`.
+core::Result<void> clear_leftover(const fs::path& target, const fs::path& partial, bool replace,
+                                  const FolderKind& kind) {
+  if (!is_there(partial)) return {};
+  if (!replace && is_complete(partial, kind)) {
     return core::usage_error(fmt::format(
-        "{}: is in the way: results are first written there; remove it or name another output folder",
-        partial.string()));
+        "{}: holds a complete result; its run was ended before that was renamed to {}. Rename it, "
+        "or --resume does (map, hub, robot); --force drops it",
+        partial.string(), target.filename().string()));
   }
-  if (takes_over) return {};
-
-  const int lock = lock_marker(partial, O_RDONLY);
-  if (lock < 0 && !fs::is_empty(partial, ec)) return another_run(partial);
   if (!replace && holds_map(partial)) {
-    if (lock >= 0) close(lock);
     return core::usage_error(
         fmt::format("{}: holds the map of an interrupted run; --resume continues it, --force drops it",
                     partial.string()));
   }
 
-  fs::remove_all(partial, ec);
-  if (lock >= 0) close(lock);
-  if (ec)
-    return core::output_error(fmt::format("{}: cannot be removed ({})", partial.string(), ec.message()));
-  return {};
+  const auto foreign = core::foreign_files(partial, files_of(partial, kind));
+  if (!foreign.empty()) {
+    return core::usage_error(
+        fmt::format("{}: holds files that are not of the interrupted run: {}; move them "
+                    "elsewhere, or name another output folder",
+                    partial.string(), core::list_of_files(foreign)));
+  }
+  return discard(partial, kind);
+}
+
+/// Moves an earlier result back that was waiting to be replaced when its run was killed.
+void put_back(const fs::path& target, const fs::path& partial, const FolderKind& kind) {
+  const fs::path old = replaced_of(target);
+  std::error_code ec;
+  const bool waits = fs::exists(old / kReplaced, ec) || is_complete(partial, kind);
+  if (is_there(target) || !waits || !kind.is_earlier(old) || fs::exists(old / kUnfinished, ec)) return;
+  fs::rename(old, target, ec);
+  fs::remove(target / kReplaced, ec);
+}
+
+/// Removes the earlier result that a run has replaced.
+void drop_replaced(const fs::path& target, const FolderKind& kind) {
+  const fs::path old = replaced_of(target);
+  if (!is_replaced(old, kind)) return;
+  const auto dropped = discard(old, kind);
+  (void)dropped;  // the next run that replaces the result tries it again
+}
+
+/// The reason why a result cannot be moved to its target, and where it is instead.
+core::Error not_moved(const core::Error& why, const fs::path& target, const fs::path& partial) {
+  return {core::ErrorKind::kOutput,
+          fmt::format("{}. The complete result is in {}: when {} is free, rename it to that", why.message,
+                      partial.string(), target.string())};
 }
 
 }  // namespace
 
-bool is_result_folder(const fs::path& folder) {
-  std::error_code ec;
-  return fs::is_regular_file(folder / "summary.json", ec) && fs::is_regular_file(folder / "config.yaml", ec);
-}
-
-OutputFolder::OutputFolder(fs::path target, fs::path partial, int lock, IsEarlier is_earlier)
-    : target_(std::move(target)), partial_(std::move(partial)), lock_(lock), is_earlier_(is_earlier) {}
+OutputFolder::OutputFolder(fs::path target, int lock, bool replace, const FolderKind& kind)
+    : target_(std::move(target)),
+      partial_(with_ending(target_, ".partial")),
+      lock_(lock),
+      replace_(replace),
+      kind_(&kind) {}
 
 OutputFolder::OutputFolder(OutputFolder&& other) noexcept
     : target_(std::move(other.target_)),
       partial_(std::exchange(other.partial_, {})),
       lock_(std::exchange(other.lock_, -1)),
-      is_earlier_(other.is_earlier_),
+      replace_(other.replace_),
+      kind_(other.kind_),
       kept_(other.kept_) {}
 
 OutputFolder::~OutputFolder() {
-  if (!partial_.empty() && !kept_) {
-    std::error_code ignored;
-    fs::remove_all(partial_, ignored);
+  if (!partial_.empty() && !kept_ && check_there()) {
+    const auto discarded = discard(partial_, *kind_);
+    (void)discarded;  // what cannot be removed is recognised by its marker
   }
   if (lock_ >= 0) close(lock_);
 }
@@ -135,16 +184,27 @@ OutputFolder::~OutputFolder() {
 fs::path OutputFolder::partial_of(const fs::path& out) { return with_ending(normal(out), ".partial"); }
 
 core::Result<OutputFolder> OutputFolder::prepare(const fs::path& out, bool replace, bool takes_over,
-                                                 IsEarlier is_earlier) {
+                                                 const FolderKind& kind) {
   if (out.empty()) return core::usage_error("the output folder has no name");
   const fs::path target = normal(out);
-  if (auto checked = check_target(target, replace, is_earlier); !checked)
-    return tl::unexpected(checked.error());
-
   const fs::path partial = with_ending(target, ".partial");
-  if (auto cleared = clear_leftover(partial, replace, takes_over); !cleared)
-    return tl::unexpected(cleared.error());
 
+  // While this is locked no other run moves anything.
+  auto leftover = lock_leftover(partial, kind);
+  if (!leftover) return tl::unexpected(leftover.error());
+  if (takes_over && is_complete(partial, kind) && read_notes(partial).replaces) replace = true;
+  if (!takes_over || !is_complete(partial, kind)) put_back(target, partial, kind);
+
+  auto free = check_target(target, replace, kind);
+  if (free) free = check_replaced(target, kind);
+  if (free && !takes_over) free = clear_leftover(target, partial, replace, kind);
+  if (!free) return tl::unexpected(free.error());
+  return begin(target, takes_over ? std::move(*leftover) : FileLock(), replace, takes_over, kind);
+}
+
+core::Result<OutputFolder> OutputFolder::begin(const fs::path& target, FileLock lock, bool replace,
+                                               bool takes_over, const FolderKind& kind) {
+  const fs::path partial = with_ending(target, ".partial");
   std::error_code ec;
   fs::create_directories(partial, ec);
   if (ec) {
@@ -152,16 +212,15 @@ core::Result<OutputFolder> OutputFolder::prepare(const fs::path& out, bool repla
                                           target.string(), ec.message()));
   }
 
-  const int lock = lock_marker(partial, O_CREAT | O_WRONLY);
-  if (lock < 0) {
-    std::error_code gone;
-    if (fs::exists(partial / kMarker, gone))
-      return another_run(partial);  // it began a moment before this one
+  if (fs::exists(partial / kFiles, ec)) fs::rename(partial / kFiles, partial / kUnfinished, ec);
+  if (!lock) lock = lock_marker(partial, true);
+  if (!lock) {
+    if (has_marker(partial)) return another_run(partial);  // it began a moment before this one
     return core::output_error(
         fmt::format("{}: cannot be written; name a folder where you may write", target.string()));
   }
 
-  OutputFolder folder(target, partial, lock, is_earlier);
+  OutputFolder folder(target, lock.release(), replace, kind);
   const fs::space_info space = fs::space(partial, ec);
   if (!ec && space.available < kLeastFreeMb * kMegabyte) {
     return core::output_error(fmt::format("{}: only {} MB are free there; at least {} MB are needed",
@@ -172,28 +231,101 @@ core::Result<OutputFolder> OutputFolder::prepare(const fs::path& out, bool repla
   return folder;
 }
 
-core::Result<void> OutputFolder::commit() {
-  std::error_code ec;
-  fs::remove(partial_ / kMarker, ec);
-  const fs::path old = with_ending(target_, ".replaced");
-
-  const bool replaces = fs::exists(target_, ec) && !fs::is_empty(target_, ec);
-  if (replaces) {
-    if (is_earlier_(old)) fs::remove_all(old, ec);
-    fs::rename(target_, old, ec);
-    if (ec)
-      return core::output_error(fmt::format("{}: cannot be replaced ({})", target_.string(), ec.message()));
+core::Result<bool> OutputFolder::finish(const fs::path& out, bool replace, const FolderKind& kind) {
+  const fs::path target = normal(out);
+  const fs::path partial = with_ending(target, ".partial");
+  if (!is_there(partial)) {
+    if (!kind.is_earlier(target)) return false;
+    drop_replaced(target, kind);
+    return true;
   }
 
-  fs::rename(partial_, target_, ec);
+  auto lock = lock_leftover(partial, kind);
+  if (!lock || !is_complete(partial, kind)) return false;  // prepare() tells why
+  OutputFolder folder(target, lock->release(), replace || read_notes(partial).replaces, kind);
+  folder.kept_ = true;
+  if (auto placed = folder.put_in_place(); !placed) return tl::unexpected(placed.error());
+  return true;
+}
+
+core::Result<void> OutputFolder::expect(const core::FileNames& files) {
+  FolderNotes notes = read_notes(partial_);
+  for (const std::string& file : files) {
+    const bool known = core::is_own_file(file, kind_->files) || fs::path(file).is_absolute();
+    if (!known) notes.files.push_back(file);
+  }
+  return write_notes(lock_, partial_, notes);
+}
+
+core::Result<void> OutputFolder::check_there() const {
+  struct stat locked {};
+  if (lock_ < 0 || fstat(lock_, &locked) != 0) return {};
+  for (const char* marker : {kUnfinished, kFiles}) {
+    struct stat found {};
+    if (lstat((partial_ / marker).c_str(), &found) == 0 && found.st_dev == locked.st_dev &&
+        found.st_ino == locked.st_ino)
+      return {};
+  }
+  return core::output_error(
+      fmt::format("{}: was removed or moved away while the run was writing there; start the run again, and "
+                  "leave that folder "
+                  "alone until it is renamed to {}",
+                  partial_.string(), target_.filename().string()));
+}
+
+core::Error OutputFolder::explained(core::Error error) const {
+  const auto there = check_there();
+  return there ? std::move(error) : there.error();
+}
+
+core::Result<void> OutputFolder::mark_complete() {
+  FolderNotes notes;
+  notes.replaces = replace_;
+  const core::FileNames all = files_of(partial_, *kind_);
+  for (const std::string& file : core::files_below(partial_)) {
+    if (core::is_own_file(file, all) && !core::is_own_file(file, kind_->files) && file != kUnfinished)
+      notes.files.push_back(file);
+  }
+  if (auto noted = write_notes(lock_, partial_, notes); !noted) return noted;
+
+  std::error_code ec;
+  fs::rename(partial_ / kUnfinished, partial_ / kFiles, ec);
+  if (!ec) return {};
+  return core::output_error(fmt::format("{}: cannot be written ({})", partial_.string(), ec.message()));
+}
+
+core::Result<void> OutputFolder::commit() {
+  if (auto there = check_there(); !there) return there;
+  kept_ = true;
+  if (auto marked = mark_complete(); !marked) return marked;
+  return put_in_place();
+}
+
+core::Result<void> OutputFolder::put_in_place() {
+  auto free = check_target(target_, replace_, *kind_);
+  if (free) free = check_replaced(target_, *kind_);
+  if (!free) return tl::unexpected(not_moved(free.error(), target_, partial_));
+
+  std::error_code ec;
+  const bool replaces = is_there(target_);
+  const fs::path old = replaced_of(target_);
+  if (replaces) {
+    drop_replaced(target_, *kind_);
+    std::ofstream(target_ / kReplaced).flush();
+    fs::rename(target_, old, ec);
+  }
+  if (!ec) fs::rename(partial_, target_, ec);
   if (ec) {
     std::error_code ignored;
-    if (replaces) fs::rename(old, target_, ignored);
-    return core::output_error(fmt::format("{}: cannot be created ({})", target_.string(), ec.message()));
+    if (replaces && !is_there(target_)) fs::rename(old, target_, ignored);
+    if (replaces) fs::remove(target_ / kReplaced, ignored);
+    const std::string why = fmt::format("{}: cannot be written ({})", target_.string(), ec.message());
+    return tl::unexpected(not_moved({core::ErrorKind::kOutput, why}, target_, partial_));
   }
 
   partial_.clear();
-  if (replaces) fs::remove_all(old, ec);
+  if (!kind_->stays_marked && read_notes(target_).files.empty()) fs::remove(target_ / kFiles, ec);
+  drop_replaced(target_, *kind_);
   return {};
 }
 

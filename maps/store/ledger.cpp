@@ -2,6 +2,7 @@
 #include <system_error>
 
 #include "plumbline/maps/store_replica.hpp"
+#include "store/store_schema.hpp"
 #include "store/store_sqlite.hpp"
 
 namespace plumbline::maps {
@@ -25,6 +26,7 @@ core::Result<std::map<std::string, std::string>> Ledger::all() const {
   if (!std::filesystem::exists(file_, ignored)) return texts;
   return guarded(file_, ErrorKind::kInput, [&] {
     Database database(file_, Database::Access::kRead);
+    if (is_blank(database)) return texts;  // its writer was killed before the first commit
     check_ledger(database);
     Statement rows(database, "SELECT name, value FROM text");
     while (rows.step()) texts.emplace(rows.text(0), rows.text(1));

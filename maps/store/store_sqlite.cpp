@@ -1,18 +1,48 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "store/store_sqlite.hpp"
 
+#include <cerrno>
+#include <system_error>
+
+#include "plumbline/core/shortage.hpp"
+
 namespace plumbline::maps {
 namespace {
 
 constexpr int kPatienceMs = 3000;
 
+/// The shortage that made SQLite fail; "": something else was wrong.
+std::string shortage_of(const SQLite::Exception& error) {
+  const int code = error.getErrorCode() & 0xff;
+  if (code == SQLITE_NOMEM || error.getExtendedErrorCode() == SQLITE_IOERR_NOMEM)
+    return core::shortage_of(ENOMEM);
+  const bool open = code == SQLITE_CANTOPEN || code == SQLITE_IOERR;
+  return open && core::files_are_short() ? core::shortage_of(EMFILE) : "";
+}
+
+/// Rolls back what a killed writer had not committed: SQLite does so when a file is first read, but only if
+/// it is open for writing. Without a journal that is not needed, and readers change nothing.
+void roll_back_journal(const std::string& file) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(file + "-journal", ignored)) return;
+  try {
+    SQLite::Database database(file, SQLITE_OPEN_READWRITE | SQLITE_OPEN_FULLMUTEX, kPatienceMs);
+    SQLite::Statement(database, "SELECT count(*) FROM sqlite_master").executeStep();
+  } catch (const SQLite::Exception&) {
+    return;  // reading the file tells why
+  }
+}
+
 /// With a mutex, because several threads read clouds. An absolute path is never read as a URI or an option.
 SQLite::Database opened(const std::filesystem::path& file, Database::Access access) {
   try {
-    return SQLite::Database(std::filesystem::absolute(file).string(),
-                            static_cast<int>(access) | SQLITE_OPEN_FULLMUTEX, kPatienceMs);
+    const std::string path = std::filesystem::absolute(file).string();
+    if (access == Database::Access::kRead) roll_back_journal(path);
+    return SQLite::Database(path, static_cast<int>(access) | SQLITE_OPEN_FULLMUTEX, kPatienceMs);
   } catch (const SQLite::Exception& error) {
     const std::string why = error.getErrorStr();
+    if (const std::string shortage = shortage_of(error); !shortage.empty())
+      throw StoreFailure(core::ErrorKind::kOutput, "cannot be opened: " + shortage);
     if (access != Database::Access::kCreate) {
       throw StoreFailure(core::ErrorKind::kInput,
                          "cannot be opened (" + why + "); check path and permissions");
@@ -45,6 +75,8 @@ std::string remedy_of(int code) {
 }  // namespace
 
 StoreFailure failure_of(const SQLite::Exception& error, core::ErrorKind kind) {
+  if (const std::string shortage = shortage_of(error); !shortage.empty())
+    return {core::ErrorKind::kOutput, shortage + " (SQLite: " + error.what() + ")"};
   const int code = error.getErrorCode() & 0xff;
   const bool content = code == SQLITE_NOTADB || code == SQLITE_CORRUPT;
   return {content ? core::ErrorKind::kInput : kind, remedy_of(code) + " (SQLite: " + error.what() + ")"};

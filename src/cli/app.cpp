@@ -17,6 +17,7 @@
 
 #include "paths.hpp"
 #include "plumbline/cloud/filters/filter_plugin.hpp"
+#include "plumbline/core/shortage.hpp"
 #include "terminal/help.hpp"
 #include "terminal/signals.hpp"
 #include "terminal/version_text.hpp"
@@ -26,7 +27,7 @@ namespace {
 
 const char* const kFooter =
     "Exit codes: 0 done, 1 a bug, 2 usage or configuration, 3 input data, 4 done but not trustworthy,\n"
-    "5 output cannot be written. More about a command: plumbline COMMAND --help";
+    "5 output cannot be written or memory is short. More about a command: plumbline COMMAND --help";
 
 /// The exit code `code`, unless standard output cannot be written, of which `cause` is the errno if it is
 /// known: it is buffered, and what is lost may show only at the end. A reader that closes its pipe wants no
@@ -51,14 +52,15 @@ int run_command(Session& session) {
   std::string what;
   try {
     return check_standard_output(session, session.command());
-  } catch (const std::bad_alloc&) {
-    session.console().error("not enough memory");
-    return static_cast<int>(core::ErrorKind::kInternal);
   } catch (const std::system_error& e) {
     if (std::ferror(stdout) != 0)  // thrown by fmt::print
       return check_standard_output(session, static_cast<int>(core::ErrorKind::kOutput), e.code().value());
+    if (const core::Error error = core::error_of(e); error.kind == core::ErrorKind::kOutput)
+      return session.fail(error);
     what = e.what();
   } catch (const std::exception& e) {
+    if (const core::Error error = core::error_of(e); error.kind == core::ErrorKind::kOutput)
+      return session.fail(error);
     what = e.what();
   }
 

@@ -9,6 +9,8 @@
 #include <cstring>
 #include <system_error>
 
+#include "plumbline/core/shortage.hpp"
+
 namespace plumbline::core {
 namespace {
 
@@ -97,7 +99,9 @@ void OutputFile::flush() {
 
 void OutputFile::fail(const std::string& what, int cause) {
   if (!problem_.empty()) return;
-  problem_ = target_.string() + ": " + what + " (" + std::strerror(cause) + "); " + remedy(cause);
+  const std::string shortage = shortage_of(cause);
+  problem_ = target_.string() + ": " + what + " (" + std::strerror(cause) + "); " +
+             (shortage.empty() ? remedy(cause) : shortage);
 }
 
 void OutputFile::discard() {

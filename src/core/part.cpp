@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "plumbline/core/shortage.hpp"
+
 namespace plumbline::core {
 namespace {
 
@@ -75,8 +77,11 @@ Result<const void*> load_part(const std::string& name, std::uint64_t layout) {
 
   void* handle = dlopen(path.c_str(), RTLD_LAZY | RTLD_LOCAL);
   if (handle == nullptr) {
-    const char* why = dlerror();
-    return unfit(fmt::format("cannot be loaded ({})", why == nullptr ? "unknown reason" : why));
+    const char* words = dlerror();
+    const std::string why = words == nullptr ? "unknown reason" : words;
+    if (const std::string shortage = shortage_of_linker(why); !shortage.empty())
+      return output_error(fmt::format("{}: cannot be loaded: {}", path, shortage));
+    return unfit(fmt::format("cannot be loaded ({})", why));
   }
 
   using Entry = PartEntry (*)();

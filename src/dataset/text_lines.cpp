@@ -4,7 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <fstream>
+
+#include "plumbline/core/shortage.hpp"
 
 namespace plumbline::dataset {
 
@@ -19,7 +22,10 @@ std::vector<std::string> split_words(std::string_view text, std::string_view sep
 }
 
 core::Result<std::vector<RawLine>> read_raw_lines(const std::filesystem::path& file, std::size_t most) {
+  errno = 0;
   std::ifstream stream(file);
+  if (const std::string shortage = stream ? "" : core::shortage_of(errno); !shortage.empty())
+    return core::output_error(fmt::format("{}: cannot be read: {}", file.string(), shortage));
   std::error_code ignored;
   if (!stream || std::filesystem::is_directory(file, ignored)) {
     return core::input_error(fmt::format("{}: cannot be read: missing, or no permission", file.string()));

@@ -15,7 +15,7 @@ enum class ErrorKind {
   kUsage = 2,          ///< command line or configuration
   kInput = 3,          ///< input data missing, unreadable or unusable
   kUntrustworthy = 4,  ///< done, but the result must not be trusted as it is
-  kOutput = 5,         ///< output cannot be written
+  kOutput = 5,         ///< output cannot be written, or memory, files or threads are short
 };
 
 struct Error {

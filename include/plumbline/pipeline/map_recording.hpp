@@ -43,8 +43,9 @@ struct MapRequest : RunRequest {
   std::function<void(maps::Map&)> alter_map;
 };
 
-/// True if there is nothing to resume: OUT is whole and no run was interrupted since.
-bool is_finished(const std::filesystem::path& out);
+/// True if there is nothing to resume: OUT is whole and no run was interrupted since. A complete result that
+/// a killed run has not renamed to OUT is renamed. Error (kOutput): it cannot be, as something else is there.
+core::Result<bool> is_finished(const std::filesystem::path& out, bool replace);
 
 /// Robots are numbered by the names of their folders (where these are alike, by the folders that they lie
 /// in): the order of `input` and `others` changes nothing. Checks everything first (pipeline: kUsage,

@@ -25,7 +25,10 @@ int hub(Session& session, net::HubRequest request, double quota_gb, const std::s
   request.quota_bytes = static_cast<std::uint64_t>(quota_gb * 1e9);
   request.fresh_id = fresh_id();
 
-  if (request.resume && pipeline::is_finished(request.fuse.output)) {
+  const auto finished =
+      request.resume ? pipeline::is_finished(request.fuse.output, request.fuse.replace) : false;
+  if (!finished) return session.fail(finished.error());
+  if (*finished) {
     session.console().info(request.fuse.output.string() + ": is finished; there is nothing to continue");
     return 0;
   }

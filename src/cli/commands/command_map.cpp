@@ -39,7 +39,9 @@ int map(Session& session, pipeline::MapRequest request, const std::vector<std::s
 
   if (auto equipped = session.equip(request); !equipped) return session.fail(equipped.error());
 
-  if (request.resume && pipeline::is_finished(request.output)) {
+  const auto finished = request.resume ? pipeline::is_finished(request.output, request.replace) : false;
+  if (!finished) return session.fail(finished.error());
+  if (*finished) {
     if (const std::string stopped = stopped_after(request.output); !stopped.empty()) {
       return session.fail({core::ErrorKind::kUsage,
                            fmt::format("{}: was stopped after {} and cannot be continued; leave out --resume "

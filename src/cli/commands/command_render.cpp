@@ -16,6 +16,7 @@
 #include "plumbline/cloud/fusion/dense_fusion.hpp"
 #include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/cloud/io/ply.hpp"
+#include "plumbline/core/own_files.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/maps/output_check.hpp"
 #include "plumbline/maps/output_folder.hpp"
@@ -156,14 +157,20 @@ core::Result<void> turn(const RenderRequest& request, const viz::Scene& scene, C
   const bool film = is_film(request.output);
   fs::path folder = request.output;
   if (film) folder += ".pictures";
+  std::error_code ignored;
+  if (film && fs::exists(folder, ignored)) {
+    return core::usage_error(
+        fmt::format("{}: is in the way: the film's pictures are first written there; move it elsewhere",
+                    folder.string()));
+  }
+
   auto drawn =
       viz::render_turntable(scene, request.options, request.turntable, folder, console.counting("pictures"));
   console.end_progress();
   if (!film) return drawn;
   if (drawn) drawn = make_film(folder, kPicturesPerSecond, request.output);
-  std::error_code ignored;
-  fs::remove_all(folder, ignored);
-  return drawn;
+  const auto removed = core::remove_own_files(folder, {"*.png"});
+  return drawn ? removed : drawn;
 }
 
 core::Result<void> render(RenderRequest& request, Session& session) {

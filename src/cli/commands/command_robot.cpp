@@ -40,8 +40,10 @@ int robot(Session& session, net::RobotRequest request, const std::string& publis
   Console& console = session.console();
   const auto status = [&](const std::string& line) { console.status(line); };
   std::filesystem::path earlier = net::earlier_run(request.map.input);
-  if (earlier.empty() && request.map.resume && pipeline::is_finished(request.map.output)) {
-    earlier = request.map.output;
+  if (earlier.empty() && request.map.resume) {
+    const auto finished = pipeline::is_finished(request.map.output, request.map.replace);
+    if (!finished) return session.fail(finished.error());
+    if (*finished) earlier = request.map.output;
   }
 
   if (!earlier.empty()) {

@@ -14,6 +14,7 @@
 #include "images/image_decoders.hpp"
 #include "layout.hpp"
 #include "plumbline/core/output_file.hpp"
+#include "plumbline/core/own_files.hpp"
 #include "plumbline/core/text.hpp"
 
 namespace plumbline::dataset {
@@ -42,19 +43,33 @@ std::string beginning_of(const fs::path& file, std::size_t count) {
   return text;
 }
 
+/// Files of a copy in a folder; its images are named by their stamps.
+const core::FileNames kPartsOfACopy{"rgb/*.*", "depth/*.*", "camera.yaml", "groundtruth.txt",
+                                    "associations.txt"};
+
 /// The list of a copy that is being written (core::OutputFile).
 bool is_unfinished_list(const fs::path& file) {
   return file.filename().string().rfind(".associations.txt.", 0) == 0;
 }
 
+/// True for "1305031102.175304000.png", and for what is first written for it.
+bool is_image_of_a_copy(const std::string& name) {
+  constexpr std::size_t kDecimals = 9;
+  const std::size_t begin = name.find_first_not_of(".-");
+  const std::size_t point = name.find('.', begin);
+  const std::size_t end = point == std::string::npos ? point : name.find('.', point + 1);
+  return end != std::string::npos && end - point == kDecimals + 1 &&
+         name.find_first_not_of(".0123456789", begin) > end;
+}
+
 /// True if the folder has no more in it than what a copy consists of, finished or not.
 bool only_parts_of_a_copy(const fs::path& folder) {
-  const std::set<std::string> parts{"rgb", "depth", "camera.yaml", "groundtruth.txt", "associations.txt"};
-  std::error_code ec;
-  for (fs::directory_iterator it(folder, ec), end; !ec && it != end; it.increment(ec)) {
-    if (parts.count(it->path().filename().string()) == 0 && !is_unfinished_list(it->path())) return false;
-  }
-  return !ec;
+  const std::vector<std::string> files = core::files_below(folder);
+  return core::foreign_files(folder, kPartsOfACopy).empty() &&
+         std::all_of(files.begin(), files.end(), [](const std::string& file) {
+           const bool image = file.rfind("rgb/", 0) == 0 || file.rfind("depth/", 0) == 0;
+           return !image || file.back() == '/' || is_image_of_a_copy(fs::path(file).filename().string());
+         });
 }
 
 /// True if convert_recording() wrote what is there: no other recording may be replaced.
@@ -86,19 +101,25 @@ core::Result<void> make_room(const fs::path& out, bool file, bool replace) {
 }
 
 /// Removes what an interrupted copy left where the folder is first written, and nothing else.
-core::Result<void> clear_leftover(const fs::path& partial) {
+core::Result<void> clear_leftover(const fs::path& partial, bool replace) {
   std::error_code ec;
   if (!fs::exists(partial, ec)) return {};
+  const bool complete = is_copy(partial, false);
+  if (complete && !replace) {
+    return core::usage_error(fmt::format(
+        "{}: holds a complete copy that was not moved to its place; rename it, or --force drops it",
+        partial.string()));
+  }
+
   const bool unfinished =
       std::any_of(fs::directory_iterator(partial, ec), fs::directory_iterator(),
                   [](const fs::directory_entry& entry) { return is_unfinished_list(entry.path()); });
-  if (!unfinished || !only_parts_of_a_copy(partial)) {
+  if (!complete && !(unfinished && only_parts_of_a_copy(partial)) && !fs::is_empty(partial, ec)) {
     return core::usage_error(
         fmt::format("{}: is in the way: the copy is first written there; move it or choose another name",
                     partial.string()));
   }
-  fs::remove_all(partial, ec);
-  return {};
+  return core::remove_own_files(partial, kPartsOfACopy);
 }
 
 /// Checks the place before a frame is read, and clears it of an interrupted copy.
@@ -107,16 +128,31 @@ core::Result<void> check_place(const fs::path& out, const fs::path& partial, boo
     if (auto fit = check_folder_name(out); !fit) return fit;
   }
   if (auto room = make_room(out, file, replace); !room) return room;
-  return file ? core::check_writable(out) : clear_leftover(partial);
+  return file ? core::check_writable(out) : clear_leftover(partial, replace);
+}
+
+/// Asks again whether `out` may be written: it may have come while the copy was made. `written`: where the
+/// copy is, "" if it is not written yet.
+core::Result<void> make_room_again(const fs::path& out, bool file, bool replace, const fs::path& written) {
+  const auto room = make_room(out, file, replace);
+  if (room) return {};
+  const std::string where = written.empty() ? "the copy is not written"
+                                            : fmt::format("the copy is complete in {}", written.string());
+  return core::output_error(fmt::format("{}; {}", room.error().message, where));
 }
 
 /// Moves a folder, which was written beside its destination, to it.
-core::Result<void> put_in_place(const fs::path& written, const fs::path& out) {
+core::Result<void> put_in_place(const fs::path& written, const fs::path& out, bool replace) {
+  if (auto room = make_room_again(out, false, replace, written); !room) return room;
   std::error_code problem;
-  fs::remove_all(out, problem);
+  fs::path old = out.has_filename() ? out : out.parent_path();
+  old += ".replaced";
+  const bool replaces = fs::exists(out, problem) && !fs::is_empty(out, problem);
+  if (replaces) fs::rename(out, old, problem);
   if (!problem) fs::rename(written, out, problem);
-  if (!problem) return {};
-  return core::output_error(fmt::format("{}: cannot be written: {}", out.string(), problem.message()));
+  if (!problem) return replaces ? core::remove_own_files(old, kPartsOfACopy) : core::Result<void>();
+  return core::output_error(fmt::format("{}: cannot be written ({}); the copy is complete in {}",
+                                        out.string(), problem.message(), written.string()));
 }
 
 core::Result<ConvertSummary> copy_frames(const FrameSource& source, CopyTarget& target,
@@ -183,15 +219,18 @@ core::Result<ConvertSummary> convert_recording(const FrameSource& source, const 
     log.warning("the poses that the recorder kept are not in the copy: it is tracked without them");
   if (file && !odometry && source.truth())
     log.warning("the ground truth is not in the copy: a bag has no place for it; a folder has");
-  if (summary) done = (*target)->finish(odometry ? std::nullopt : source.truth());
-  if (summary && done && !file) done = put_in_place(folder, out);
+  if (summary && file) done = make_room_again(out, true, options.replace, "");
+  if (summary && done) done = (*target)->finish(odometry ? std::nullopt : source.truth());
 
   if (!summary || !done) {
-    std::error_code ignored;
-    if (!file) fs::remove_all(folder, ignored);
+    target->reset();
+    const auto removed = file ? core::Result<void>() : core::remove_own_files(folder, kPartsOfACopy);
+    (void)removed;  // the next copy recognises what is left
     return tl::unexpected(summary ? done.error() : summary.error());
   }
 
+  if (!file) done = put_in_place(folder, out, options.replace);
+  if (!done) return tl::unexpected(done.error());
   return summary;
 }
 

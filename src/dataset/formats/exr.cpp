@@ -86,6 +86,8 @@ bool is_exr(const Bytes& file) {
 cv::Mat decode_exr(const Bytes& file) {
   try {
     return read_channel(file);
+  } catch (const std::bad_alloc&) {
+    throw;  // no fault of the image
   } catch (const std::exception&) {
     return {};
   }

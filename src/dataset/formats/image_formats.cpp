@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "images/image_formats.hpp"
 
+#include <new>
 #include <opencv2/imgcodecs.hpp>
 
 #include "formats/exr.hpp"
@@ -8,11 +9,17 @@
 namespace plumbline::dataset {
 namespace {
 
+/// Throws again what is no fault of the image.
+void check_memory(const cv::Exception& problem) {
+  if (problem.code == cv::Error::StsNoMem) throw std::bad_alloc();
+}
+
 cv::Mat decode(const Bytes& file) {
   if (is_exr(file)) return decode_exr(file);
   try {
     return cv::imdecode(file, cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception&) {
+  } catch (const cv::Exception& problem) {
+    check_memory(problem);
     return {};
   }
 }
@@ -25,7 +32,8 @@ Bytes encode_png(const cv::Mat& image, int level) {
   if (level != 1) how = {cv::IMWRITE_PNG_COMPRESSION, level};
   try {
     if (!cv::imencode(".png", image, bytes, how)) bytes.clear();
-  } catch (const cv::Exception&) {
+  } catch (const cv::Exception& problem) {
+    check_memory(problem);
     bytes.clear();
   }
   return bytes;
@@ -35,7 +43,8 @@ Bytes encode_tiff(const cv::Mat& image) {
   Bytes bytes;
   try {
     if (!cv::imencode(".tiff", image, bytes)) bytes.clear();
-  } catch (const cv::Exception&) {
+  } catch (const cv::Exception& problem) {
+    check_memory(problem);
     bytes.clear();
   }
   return bytes;

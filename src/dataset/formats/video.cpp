@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <memory>
+#include <new>
 #include <opencv2/videoio.hpp>
 
 #include "films/video_frames.hpp"
@@ -33,7 +34,8 @@ bool skip_frame(void* video) { return capture(video).grab(); }
 bool next_frame(void* video, cv::Mat& image) {
   try {
     return capture(video).read(image);
-  } catch (const cv::Exception&) {
+  } catch (const cv::Exception& problem) {
+    if (problem.code == cv::Error::StsNoMem) throw std::bad_alloc();
     return false;
   }
 }

@@ -4,12 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <fstream>
 
 #include "frame_images.hpp"
 #include "images/image_decoders.hpp"
 #include "images/image_formats.hpp"
 #include "plumbline/core/output_file.hpp"
+#include "plumbline/core/shortage.hpp"
 #include "plumbline/core/text.hpp"
 
 namespace plumbline::dataset {
@@ -23,7 +25,10 @@ core::Result<Bytes> read_bytes(const std::filesystem::path& file) {
   if (error) return core::input_error(fmt::format("{}: cannot be read: {}", file.string(), error.message()));
   if (size > kMaxFileBytes)
     return core::input_error(fmt::format("{}: too large for an image", file.string()));
+  errno = 0;
   std::ifstream stream(file, std::ios::binary);
+  if (const std::string shortage = stream ? "" : core::shortage_of(errno); !shortage.empty())
+    return core::output_error(fmt::format("{}: cannot be read: {}", file.string(), shortage));
   Bytes bytes(static_cast<std::size_t>(size));
   stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   if (!stream)

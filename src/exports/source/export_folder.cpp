@@ -14,7 +14,11 @@ bool is_export(const std::filesystem::path& folder) {
 }  // namespace
 
 core::Result<maps::OutputFolder> prepare_export(const std::filesystem::path& folder, bool replace) {
-  return maps::OutputFolder::prepare(folder, replace, false, &is_export);
+  static const maps::FolderKind kind{
+      is_export,
+      {kExportNote, "transforms.json", "points.ply", "images/*.png", "depth/*.png", "sparse/0/cameras.*",
+       "sparse/0/images.*", "sparse/0/points3D.*"}};
+  return maps::OutputFolder::prepare(folder, replace, false, kind);
 }
 
 }  // namespace plumbline::exports

@@ -39,9 +39,15 @@ thread_local bool refusing = false;
 /// A fixed number of threads; requests are refused at once while too many wait.
 class Tasks : public httplib::TaskQueue {
  public:
+  /// Throws if the system has no more threads.
   Tasks() {
-    for (std::size_t i = 0; i < Limits::kStreams + Limits::kPageThreads; ++i)
-      threads_.emplace_back([this] { work(); });
+    try {
+      for (std::size_t i = 0; i < Limits::kStreams + Limits::kPageThreads; ++i)
+        threads_.emplace_back([this] { work(); });
+    } catch (...) {
+      Tasks::shutdown();
+      throw;
+    }
   }
 
   void enqueue(std::function<void()> task) override {
@@ -283,7 +289,6 @@ core::Result<void*> start(PageServerOptions& options, std::string page) {
   auto running = std::make_unique<Running>();
   running->page = std::move(page);
   running->token = options.token;
-  running->server.new_task_queue = [] { return new Tasks; };
   running->server.set_payload_max_length(1024);
   set_routes(*running);
 
@@ -303,8 +308,20 @@ core::Result<void*> start(PageServerOptions& options, std::string page) {
     if (port == 80) running->hosts.insert(name);
   }
 
-  Running* raw = running.release();
-  raw->thread = std::thread([raw] { raw->server.listen_after_bind(); });
+  // Threads are started here, where it is an error of this call if the system has no more. The server deletes
+  // its queue.
+  auto tasks = std::make_unique<Tasks>();
+  running->server.new_task_queue = [queue = tasks.get()] { return queue; };
+  Running* raw = running.get();
+  try {
+    raw->thread = std::thread([raw] { raw->server.listen_after_bind(); });
+  } catch (...) {
+    tasks->shutdown();
+    throw;
+  }
+  static_cast<void>(tasks.release());
+  static_cast<void>(running.release());
+
   while (!raw->server.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   return raw;
 }

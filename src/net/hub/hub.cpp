@@ -14,6 +14,7 @@
 
 #include "hub/hub_server.hpp"
 #include "plumbline/core/output_file.hpp"
+#include "plumbline/core/own_files.hpp"
 #include "plumbline/core/side_thread.hpp"
 #include "plumbline/maps/output_folder.hpp"
 #include "plumbline/maps/stored_maps.hpp"
@@ -51,11 +52,10 @@ core::Result<void> move_all(const fs::path& from, const fs::path& to) {
       if (auto moved = move_all(entry.path(), target); !moved) return moved;
       continue;
     }
-    fs::remove_all(target, ec);
     fs::rename(entry.path(), target, ec);
     if (ec) return core::output_error(fmt::format("{}: cannot be made ({})", target.string(), ec.message()));
   }
-  fs::remove_all(from, ec);
+  fs::remove(from, ec);
   return {};
 }
 
@@ -146,6 +146,10 @@ core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, con
   last.maps = received_maps(folder, collected, request.robots, reason);
   last.output = folder / "fused";
   last.replace = true;
+  // A run that was killed while it moved these has left some of them.
+  if (auto removed = core::remove_own_files(last.output, maps::result_kind().files); !removed)
+    return tl::unexpected(removed.error());
+
   const auto fuse = [&]() -> core::Result<pipeline::RunSummary> {
     if (!last.maps.empty()) {
       return pipeline::fuse_stored_maps(last, executor, log, core::StopToken(), progress);
@@ -204,7 +208,12 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
     (*server)->publisher().publish_final(collected.final_statuses, enough);
   });
   auto summary = fuse_collected(request, folder, collected, (*server)->meetings(), executor, log, progress);
-  if (!summary) return summary;
+  if (!summary) {
+    core::Error error = output->explained(summary.error());
+    if (error.kind == core::ErrorKind::kOutput)
+      error.message += fmt::format("; received data are in {}, --resume continues", folder.string());
+    return tl::unexpected(error);
+  }
   if (auto committed = output->commit(); !committed) return tl::unexpected(committed.error());
   return summary;
 }

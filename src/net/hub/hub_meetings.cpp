@@ -4,8 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <system_error>
 #include <utility>
+
+#include "plumbline/core/own_files.hpp"
 
 namespace plumbline::net {
 namespace {
@@ -37,8 +38,9 @@ geometry::Rigid3 pose_of(const SharedFrame& frame) {
 
 HubMeetings::HubMeetings(const std::filesystem::path& folder, const core::Executor& executor, core::Log& log)
     : executor_(&executor), log_(&log), reported_(folder, log) {
-  std::error_code ignored;
-  std::filesystem::remove_all(folder / "meetings", ignored);
+  const auto removed =
+      core::remove_own_files(folder / "meetings", {"*/meeting.json", "*/*.txt", "*/map.png"});
+  if (!removed) log.warning(removed.error().message);
   begin();
 }
 

@@ -27,11 +27,14 @@ bool is_picture_name(const std::string& name) {
                      [](unsigned char c) { return std::isdigit(c) != 0; });
 }
 
-/// True if a folder holds debug pictures and nothing else.
+/// True for a folder of debug pictures. Numbered pictures alone may be anybody's.
 bool is_debug_folder(const fs::path& folder) {
   std::error_code ec;
+  if (!fs::is_regular_file(folder / maps::kFilesMarker, ec)) return false;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, ec)) {
-    if (!entry.is_regular_file(ec) || !is_picture_name(entry.path().filename().string())) return false;
+    const std::string name = entry.path().filename().string();
+    const bool marker = name.rfind(".plumbline-", 0) == 0;
+    if (!entry.is_regular_file(ec) || (!marker && !is_picture_name(name))) return false;
   }
   return !ec;
 }
@@ -62,7 +65,8 @@ core::Result<DebugFolder> DebugFolder::prepare(const fs::path& folder, const fs:
 
   const fs::path relative = inside(out, folder);
   if (relative.empty()) {
-    auto own = maps::OutputFolder::prepare(folder, replace, false, is_debug_folder);
+    static const maps::FolderKind kind{is_debug_folder, {"*.png"}, true};
+    auto own = maps::OutputFolder::prepare(folder, replace, false, kind);
     if (!own) return tl::unexpected(own.error());
     result.path_ = own->path();
     result.own_.emplace(std::move(*own));
@@ -70,8 +74,14 @@ core::Result<DebugFolder> DebugFolder::prepare(const fs::path& folder, const fs:
   }
 
   result.path_ = out_path / relative;
+  result.within_ = relative;
   if (auto made = core::make_folder(result.path_); !made) return tl::unexpected(made.error());
   return result;
+}
+
+core::FileNames DebugFolder::files() const {
+  if (own_) return {};
+  return {(within_ / "*.png").lexically_normal().generic_string()};
 }
 
 core::Result<void> write_debug_picture(const fs::path& folder, std::size_t number,

@@ -24,10 +24,13 @@ class DebugFolder {
                                            const std::filesystem::path& out_path, bool replace);
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }  ///< folder to write to
+  /// Names of the pictures within the result folder; none if they have a folder of their own.
+  [[nodiscard]] core::FileNames files() const;
   core::Result<void> commit() { return own_ ? own_->commit() : core::Result<void>(); }
 
  private:
   std::filesystem::path path_;
+  std::filesystem::path within_;           ///< the result folder
   std::optional<maps::OutputFolder> own_;  ///< none inside the result folder
 };
 

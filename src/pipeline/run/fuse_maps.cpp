@@ -81,15 +81,16 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
   context.executor = &executor;
   context.log = &log;
   context.stop = stop;
+  if (auto ok = announce_files(*graph, {}, *output); !ok) return tl::unexpected(ok.error());
   if (auto ok = core::write_file(output->path() / "config.yaml", context.store.configuration); !ok)
     return tl::unexpected(ok.error());
 
   const auto report = run_graph(*graph, context, progress);
-  if (!report) return tl::unexpected(report.error());
+  if (!report) return tl::unexpected(output->explained(report.error()));
 
   RunSummary summary = summary_of_run(*graph, *report, request, context.input.text, 0.0, began, executor);
   if (auto ok = commit_result(summary, *output, *graph, request, context); !ok)
-    return tl::unexpected(ok.error());
+    return tl::unexpected(output->explained(ok.error()));
 
   return summary;
 }

@@ -12,6 +12,7 @@
 #include "graph/graph_parts.hpp"
 #include "plumbline/core/hash.hpp"
 #include "plumbline/core/output_file.hpp"
+#include "plumbline/core/shortage.hpp"
 #include "plumbline/core/version.hpp"
 #include "plumbline/dataset/live.hpp"
 #include "plumbline/maps/output_folder.hpp"
@@ -229,6 +230,7 @@ void report_resumed(const std::filesystem::path& folder, const std::optional<Res
 
 /// Keeps what a failed run has stored, and adds that to the error.
 core::Error with_what_is_kept(core::Error error, maps::OutputFolder& output) {
+  error = output.explained(std::move(error));
   const std::size_t keyframes = stored_keyframes(output.path());
   if (keyframes == 0) return error;
   output.keep();
@@ -257,6 +259,19 @@ class MapRun {
   }
 
   core::Result<RunSummary> run(const core::StopToken& stop, const Progress& progress,
+                               RunClock::time_point began) {
+    try {
+      return map(stop, progress, began);
+    } catch (const std::exception& e) {
+      core::Error error = core::error_of(e);
+      if (output_) error = with_what_is_kept(std::move(error), *output_);
+      if (error.kind == core::ErrorKind::kInternal) throw;
+      return tl::unexpected(error);
+    }
+  }
+
+ private:
+  core::Result<RunSummary> map(const core::StopToken& stop, const Progress& progress,
                                RunClock::time_point began) {
     if (auto prepared = prepare(); !prepared) return tl::unexpected(prepared.error());
     RunContext context = context_of(stop);
@@ -289,7 +304,6 @@ class MapRun {
     return summary;
   }
 
- private:
   /// Prepares the output folders, and reads what they contain already.
   core::Result<void> prepare() {
     auto output = maps::OutputFolder::prepare(request_.output, request_.replace, request_.resume);
@@ -306,13 +320,13 @@ class MapRun {
 
     const std::string config = config_text(request_, graph_, executor_.threads());
     if (auto written = core::write_file(output_->path() / "config.yaml", config); !written) return written;
-    if (request_.debug_video.empty()) return {};
+    if (request_.debug_video.empty()) return announce_files(graph_, {}, *output_);
 
     auto debug =
         DebugFolder::prepare(request_.debug_video, request_.output, output_->path(), request_.replace);
     if (!debug) return tl::unexpected(debug.error());
     debug_.emplace(std::move(*debug));
-    return {};
+    return announce_files(graph_, debug_->files(), *output_);
   }
 
   RunContext context_of(const core::StopToken& stop) {
@@ -353,9 +367,8 @@ class MapRun {
 
 }  // namespace
 
-bool is_finished(const std::filesystem::path& out) {
-  std::error_code ec;
-  return maps::is_result_folder(out) && !std::filesystem::exists(maps::OutputFolder::partial_of(out), ec);
+core::Result<bool> is_finished(const std::filesystem::path& out, bool replace) {
+  return maps::OutputFolder::finish(out, replace);
 }
 
 core::Result<RunSummary> map_recording(const MapRequest& given, const core::Executor& executor,

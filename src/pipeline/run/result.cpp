@@ -71,6 +71,22 @@ core::Result<void> write_exports(const std::filesystem::path& folder, const Grap
 
 }  // namespace
 
+core::Result<void> announce_files(const Graph& graph, const core::FileNames& others,
+                                  maps::OutputFolder& output) {
+  core::FileNames files = others;
+  for (const Node& node : graph.nodes) {
+    for (const std::string& file : node.stage->files())
+      files.push_back(std::filesystem::path(file).lexically_normal().generic_string());
+    if (node.stage->wanted_exports() == nullptr) continue;
+
+    for (const exports::ExportRequest& wanted : *node.stage->wanted_exports()) {
+      const std::string name = wanted.output.lexically_normal().generic_string();
+      files.push_back(name + (wanted.output.has_extension() ? ".georeference.json" : "/**"));
+    }
+  }
+  return output.expect(files);
+}
+
 core::Result<void> commit_result(const RunSummary& summary, maps::OutputFolder& output, const Graph& graph,
                                  const RunRequest& request, const RunContext& context) {
   if (auto ok = core::write_file(output.path() / "summary.json", summary.json); !ok) return ok;

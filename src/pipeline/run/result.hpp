@@ -21,6 +21,10 @@ RunSummary summary_of_run(const Graph& graph, const RunReport& report, const Run
                           const std::string& input, double pace_hz, RunClock::time_point began,
                           const core::Executor& executor);
 
+/// Announces the files of the stages, whose names the user may have chosen. Errors: kOutput.
+core::Result<void> announce_files(const Graph& graph, const core::FileNames& others,
+                                  maps::OutputFolder& output);
+
 /// Writes summary.json and the stages' exports, and renames the folder to the result. An export that fails
 /// causes a warning only. Errors: kOutput.
 core::Result<void> commit_result(const RunSummary& summary, maps::OutputFolder& output, const Graph& graph,

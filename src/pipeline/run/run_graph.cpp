@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "plumbline/core/numbers.hpp"
+#include "plumbline/core/shortage.hpp"
 #include "plumbline/pipeline/observer.hpp"
 #include "plumbline/pipeline/run.hpp"
 #include "plumbline/pipeline/summary.hpp"
@@ -62,7 +63,8 @@ core::Result<void> guarded(const std::string& stage, const Call& call) {
   try {
     return call();
   } catch (const std::exception& e) {
-    return core::failure(core::ErrorKind::kInternal, fmt::format("stage {}: {}", stage, e.what()));
+    const core::Error error = core::error_of(e);
+    return core::failure(error.kind, fmt::format("stage {}: {}", stage, error.message));
   }
 }
 
@@ -345,7 +347,11 @@ double StageTiming::quantile_ms(double q) const {
 
 core::Result<RunReport> run_graph(Graph& graph, const RunContext& context, const Progress& progress,
                                   double pace_hz) {
-  return Runner(graph, context, progress, pace_hz).run();
+  try {
+    return Runner(graph, context, progress, pace_hz).run();
+  } catch (const std::exception& e) {  // between stages, where memory may end as well
+    return tl::unexpected(core::error_of(e));
+  }
 }
 
 }  // namespace plumbline::pipeline

@@ -39,9 +39,11 @@ class ReadStage : public Stage {
   }
   [[nodiscard]] std::size_t frames() const override { return source_->size(); }
 
-  /// A frame that cannot be read is skipped; later frames are not affected.
+  /// A frame that cannot be read is skipped; later frames are not affected. Memory or files that are short
+  /// end the run: all frames would be skipped for them.
   core::Result<void> process(StageIo& io) override {
     auto frame = source_->read(io.frame());
+    if (!frame && frame.error().kind == core::ErrorKind::kOutput) return tl::unexpected(frame.error());
     if (!frame) {
       const std::size_t reported = unreadable_++;
       const std::string text = fmt::format("frame {} is skipped: {}", io.frame(), frame.error().message);

@@ -4,6 +4,8 @@
 #include <chrono>
 #include <opencv2/core/utility.hpp>
 
+#include "plumbline/core/shortage.hpp"
+
 namespace plumbline::python {
 namespace {
 
@@ -61,10 +63,10 @@ Background::Background(Work work) {
 
         total_ = total;
       });
-    } catch (const std::bad_alloc&) {
-      result = core::failure(core::ErrorKind::kInternal, "not enough memory");
     } catch (const std::exception& e) {
-      result = core::failure(core::ErrorKind::kInternal, std::string("internal error: ") + e.what());
+      core::Error error = core::error_of(e);
+      if (error.kind == core::ErrorKind::kInternal) error.message.insert(0, "internal error: ");
+      result = tl::unexpected(error);
     }
 
     const std::lock_guard lock(mutex_);

@@ -213,6 +213,7 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
   if (!world) return fail(world.error());
   auto sources = open_all(*world);
   if (!sources) return fail(sources.error());
+  if (auto ok = check_free(output); !ok) return fail(ok.error());  // building the world took its time
   if (auto ok = core::make_folder(output); !ok) return fail(ok.error());
 
   WriteSummary summary;

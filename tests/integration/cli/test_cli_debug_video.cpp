@@ -18,8 +18,10 @@ class DebugVideo : public ProgramTest {
   }
   [[nodiscard]] std::vector<std::string> files(const std::string& folder) const {
     std::vector<std::string> names;
-    for (const auto& entry : fs::directory_iterator(path(folder)))
-      names.push_back(entry.path().filename().string());
+    for (const auto& entry : fs::directory_iterator(path(folder))) {
+      const std::string name = entry.path().filename().string();
+      if (name.front() != '.') names.push_back(name);
+    }
     std::sort(names.begin(), names.end());
     return names;
   }
@@ -63,6 +65,7 @@ TEST_F(DebugVideo, ReplacesEarlierPicturesOnlyWhenTold) {
 TEST_F(DebugVideo, NeverTouchesAnythingElse) {
   fs::create_directories(path("mine"));
   write("mine/000000.png", "a picture");
+  EXPECT_EQ(map("-o out --debug-video mine --force").code, 2) << "numbered pictures may be a recording's";
   write("mine/letter.txt", "dear");
   EXPECT_EQ(map("-o out --debug-video mine --force").code, 2);
   EXPECT_EQ(slurp(path("mine/000000.png")), "a picture");

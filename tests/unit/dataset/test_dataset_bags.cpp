@@ -160,6 +160,48 @@ TEST_F(Bags, NothingIsReplacedThatIsNoCopy) {
   EXPECT_FALSE(convert_recording(**source, folder_ / "live.mcap", options, log_));
 }
 
+TEST_F(Bags, WhatAppearsWhileACopyIsMadeIsKept) {
+  write_tum(3);
+  const auto source = open();
+  ASSERT_TRUE(source);
+  for (const std::string out : {"new", "new.mcap"}) {
+    ConvertOptions options;
+    options.replace = true;
+    options.progress = [&](std::size_t) { write_text(out == "new" ? "new/letter.txt" : out, "dear"); };
+    const auto refused = convert_recording(**source, folder_ / out, options, log_);
+    ASSERT_FALSE(refused) << out;
+    EXPECT_EQ(refused.error().kind, core::ErrorKind::kOutput) << refused.error().message;
+    EXPECT_EQ(bytes_of(out == "new" ? "new/letter.txt" : out), "dear");
+  }
+
+  // The copy waits until it is moved, or dropped when asked for.
+  std::filesystem::remove_all(folder_ / "new");
+  const auto waits = convert_recording(**source, folder_ / "new", {}, log_);
+  ASSERT_FALSE(waits);
+  EXPECT_NE(waits.error().message.find("new.partial: holds a complete copy"), std::string::npos)
+      << waits.error().message;
+  expect_same_recordings("", "new.partial");
+  ConvertOptions options;
+  options.replace = true;
+  EXPECT_TRUE(convert_recording(**source, folder_ / "new", options, log_));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "new.partial"));
+}
+
+TEST_F(Bags, AUsersPictureInACopyIsKept) {
+  write_tum(3);
+  const auto source = open();
+  ASSERT_TRUE(source);
+  copy("copy");
+  write_text("copy/rgb/holiday.jpg", "sun");
+  ConvertOptions options;
+  options.replace = true;
+  EXPECT_FALSE(convert_recording(**source, folder_ / "copy", options, log_));
+  EXPECT_EQ(bytes_of("copy/rgb/holiday.jpg"), "sun");
+  std::filesystem::remove(folder_ / "copy/rgb/holiday.jpg");
+  EXPECT_TRUE(convert_recording(**source, folder_ / "copy", options, log_));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "copy.replaced"));
+}
+
 TEST_F(Bags, OfACutFileWhatIsBeforeTheBreakIsRead) {
   write_large(6);
   copy("whole.mcap");

@@ -5,9 +5,12 @@
 #include <pcl/point_types.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <limits>
 #include <random>
 
+#include "hot_journal.hpp"
 #include "plumbline/cloud/compact/compact_cloud.hpp"
 #include "plumbline/maps/store.hpp"
 #include "plumbline/maps/store_replica.hpp"
@@ -253,6 +256,29 @@ TEST(Ledger, KeepsTexts) {
   StoreWorld world(35);
   { ASSERT_TRUE(StoreWriter::create(folder.file(), header_of(world.camera))); }
   EXPECT_FALSE(Ledger(folder.file()).put({{"a", "b"}})) << "it would spoil a map";
+}
+
+TEST(Ledger, IsReadAfterItsWriterWasKilled) {
+  const StoreFolder folder;
+  const std::map<std::string, std::string> kept{{"run", "7f"}, {"hub", "ab"}};
+  ASSERT_TRUE(Ledger(folder.path / "network.db").put(kept));
+  tests::copy_with_hot_journal(folder.path / "network.db", folder.path / "left.db");
+
+  const Ledger left(folder.path / "left.db");
+  const auto texts = left.all();
+  ASSERT_TRUE(texts) << texts.error().message;
+  EXPECT_EQ(*texts, kept) << "the transaction that was not committed is rolled back";
+  ASSERT_TRUE(left.put({{"run", "80"}}));
+  EXPECT_EQ(left.all()->at("run"), "80");
+}
+
+TEST(Ledger, IsEmptyIfItsWriterWasKilledBeforeTheFirstCommit) {
+  const StoreFolder folder;
+  std::ofstream(folder.path / "network.db").flush();
+  const auto texts = Ledger(folder.path / "network.db").all();
+  ASSERT_TRUE(texts) << texts.error().message;
+  EXPECT_TRUE(texts->empty());
+  EXPECT_TRUE(Ledger(folder.path / "network.db").put({{"run", "7f"}}));
 }
 
 }  // namespace

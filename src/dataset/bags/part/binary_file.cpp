@@ -10,6 +10,8 @@
 #include <cstring>
 #include <utility>
 
+#include "plumbline/core/shortage.hpp"
+
 namespace plumbline::dataset {
 
 BinaryFile::~BinaryFile() {
@@ -29,6 +31,8 @@ core::Result<BinaryFile> BinaryFile::open(const std::filesystem::path& file) {
   BinaryFile opened;
   opened.descriptor_ = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
   struct stat about {};
+  if (const std::string shortage = opened.descriptor_ < 0 ? core::shortage_of(errno) : ""; !shortage.empty())
+    return core::output_error(fmt::format("{}: cannot be read: {}", file.string(), shortage));
   if (opened.descriptor_ < 0 || fstat(opened.descriptor_, &about) != 0)
     return core::input_error(fmt::format("{}: cannot be read: {}", file.string(), std::strerror(errno)));
   opened.size_ = static_cast<std::uint64_t>(about.st_size);
