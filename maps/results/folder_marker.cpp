@@ -35,10 +35,14 @@ FileLock::~FileLock() {
 bool has_marker(const fs::path& folder) { return is_file(folder / kUnfinished) || is_file(folder / kFiles); }
 
 FileLock lock_marker(const fs::path& folder, bool creates) {
-  int descriptor = open((folder / kUnfinished).c_str(), O_RDWR | O_CLOEXEC);
-  if (descriptor < 0) descriptor = open((folder / kFiles).c_str(), O_RDWR | O_CLOEXEC);
-  if (descriptor < 0 && creates)
-    descriptor = open((folder / kUnfinished).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  const auto opened = [&folder](const char* marker, int flags) {
+    return open((folder / marker).c_str(), flags | O_CLOEXEC, 0644);
+  };
+
+  int descriptor = opened(kUnfinished, O_RDWR);
+  if (descriptor < 0) descriptor = opened(kFiles, O_RDWR);
+  if (descriptor < 0) descriptor = opened(kUnfinished, O_RDONLY);  // a copy from a medium that is read-only
+  if (descriptor < 0 && creates) descriptor = opened(kUnfinished, O_RDWR | O_CREAT);
 
   FileLock lock(descriptor);
   if (descriptor >= 0 && flock(descriptor, LOCK_EX | LOCK_NB) != 0) return {};

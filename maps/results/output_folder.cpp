@@ -115,6 +115,7 @@ core::Result<void> clear_leftover(const fs::path& target, const fs::path& partia
         "or --resume does (map, hub, robot); --force drops it",
         partial.string(), target.filename().string()));
   }
+
   if (!replace && holds_map(partial)) {
     return core::usage_error(
         fmt::format("{}: holds the map of an interrupted run; --resume continues it, --force drops it",
@@ -283,7 +284,8 @@ core::Result<void> OutputFolder::mark_complete() {
   notes.replaces = replace_;
   const core::FileNames all = files_of(partial_, *kind_);
   for (const std::string& file : core::files_below(partial_)) {
-    if (core::is_own_file(file, all) && !core::is_own_file(file, kind_->files) && file != kUnfinished)
+    const bool marker = file.rfind(".plumbline-", 0) == 0;
+    if (!marker && core::is_own_file(file, all) && !core::is_own_file(file, kind_->files))
       notes.files.push_back(file);
   }
   if (auto noted = write_notes(lock_, partial_, notes); !noted) return noted;
