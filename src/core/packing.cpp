@@ -2,6 +2,7 @@
 #include "plumbline/core/packing.hpp"
 
 #include <zstd.h>
+#include <zstd_errors.h>
 
 #include <algorithm>
 #include <memory>
@@ -31,6 +32,7 @@ Bytes unpack(const std::uint8_t* bytes, std::size_t size, std::size_t most_bytes
   }
   Bytes content(static_cast<std::size_t>(length));
   const std::size_t got = ZSTD_decompress(content.data(), content.size(), bytes, size);
+  if (ZSTD_getErrorCode(got) == ZSTD_error_memory_allocation) throw std::bad_alloc();
   if (ZSTD_isError(got) != 0U || got != content.size()) throw BadBytes("its bytes are truncated or damaged");
   return content;
 }

@@ -6,7 +6,6 @@
 
 #include <cerrno>
 #include <cstring>
-#include <new>
 #include <system_error>
 
 namespace plumbline::core {
@@ -40,8 +39,9 @@ std::string shortage_of(const std::exception& problem) {
     return code == EAGAIN ? kThreads : shortage_of(code);
   }
 
-  // OpenCV's StsNoMem; this module does not know its exceptions.
+  // OpenCV's StsNoMem and oneTBB's workers; this module does not know their exceptions.
   const std::string text = problem.what();
+  if (holds(text, "pthread_create has failed")) return kThreads;
   return holds(text, "(-4:Insufficient memory)") || holds(text, "OutOfMemoryError") ? kMemory : "";
 }
 

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "plumbline/core/output_file.hpp"
+#include "plumbline/core/shortage.hpp"
 
 namespace plumbline::viz {
 namespace {
@@ -83,7 +84,7 @@ Bytes filter(const cv::Mat3b& picture) {
 
 std::string compress(const Bytes& bytes) {
   const std::unique_ptr<libdeflate_compressor, decltype(&libdeflate_free_compressor)> compressor(
-      libdeflate_alloc_compressor(kLevel), &libdeflate_free_compressor);
+      core::made(libdeflate_alloc_compressor(kLevel)), &libdeflate_free_compressor);
   std::string compressed(libdeflate_zlib_compress_bound(compressor.get(), bytes.size()), '\0');
   compressed.resize(libdeflate_zlib_compress(compressor.get(), bytes.data(), bytes.size(), compressed.data(),
                                              compressed.size()));

@@ -9,6 +9,8 @@
 #include <memory>
 #include <numeric>
 
+#include "plumbline/core/shortage.hpp"
+
 namespace plumbline::viewer {
 namespace {
 
@@ -40,7 +42,7 @@ std::uint64_t mixed(std::uint64_t value) {
 
 std::string packed(const std::vector<std::uint8_t>& bytes) {
   const std::unique_ptr<libdeflate_compressor, decltype(&libdeflate_free_compressor)> compressor(
-      libdeflate_alloc_compressor(kCompression), &libdeflate_free_compressor);
+      core::made(libdeflate_alloc_compressor(kCompression)), &libdeflate_free_compressor);
   std::string out(libdeflate_deflate_compress_bound(compressor.get(), bytes.size()), '\0');
   out.resize(
       libdeflate_deflate_compress(compressor.get(), bytes.data(), bytes.size(), out.data(), out.size()));

@@ -4,6 +4,7 @@
 // Memory, files or threads that the system has no more of: no fault of the program or its input, and not for
 // long.
 #include <exception>
+#include <new>
 #include <string>
 
 #include "plumbline/core/error.hpp"
@@ -21,6 +22,13 @@ std::string shortage_of_linker(const std::string& message);
 
 /// True if no further file can be opened at this moment.
 bool files_are_short();
+
+/// The object that a library in C has made. Throws std::bad_alloc instead of a null pointer.
+template <typename Object>
+Object* made(Object* object) {
+  if (object == nullptr) throw std::bad_alloc();
+  return object;
+}
 
 /// A shortage as kOutput, any other exception as kInternal with its own words.
 Error error_of(const std::exception& problem);

@@ -8,7 +8,9 @@
 #include <cstdlib>
 // clang-format off
 #include <jpeglib.h>
+#include <jerror.h>
 // clang-format on
+#include <new>
 #include <opencv2/imgproc.hpp>
 
 #include "images/image_decoders.hpp"
@@ -39,6 +41,7 @@ std::vector<std::uint8_t> encode_jpeg(const cv::Mat& bgr, int quality) {
   if (setjmp(errors.jump) != 0) {
     jpeg_destroy_compress(&info);
     std::free(bytes);
+    if (errors.base.msg_code == JERR_OUT_OF_MEMORY) throw std::bad_alloc();
     return {};
   }
 

@@ -6,6 +6,7 @@
 #include <jpeglib.h>
 #include <jerror.h>
 // clang-format on
+#include <new>
 
 #include "images/image_decoders.hpp"
 
@@ -100,6 +101,7 @@ Decoded decode_jpeg(const Bytes& file) {
   const bool done = decode(info, errors, file, image);
   const bool adobe = info.saw_Adobe_marker != 0;
   jpeg_destroy_decompress(&info);
+  if (!done && errors.base.msg_code == JERR_OUT_OF_MEMORY) throw std::bad_alloc();
   if (done) return image.channels() == 4 ? from_cmyk(image, adobe) : image;
   return tl::unexpected<std::string>(errors.message[0] != '\0' ? errors.message : "the image is too large");
 }

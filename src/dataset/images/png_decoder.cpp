@@ -13,6 +13,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "images/image_decoders.hpp"
+#include "plumbline/core/shortage.hpp"
 
 namespace plumbline::dataset {
 namespace {
@@ -200,7 +201,7 @@ Decoded decode_png(const Bytes& file) {
 
   const std::unique_ptr<std::uint8_t[]> pixels(new std::uint8_t[size]);  // all of it is written to
   const std::unique_ptr<libdeflate_decompressor, decltype(&libdeflate_free_decompressor)> inflater(
-      libdeflate_alloc_decompressor(), &libdeflate_free_decompressor);
+      core::made(libdeflate_alloc_decompressor()), &libdeflate_free_decompressor);
 
   std::size_t produced = 0;
   const auto status = libdeflate_zlib_decompress(inflater.get(), compressed.data(), compressed.size(),

@@ -8,6 +8,8 @@
 #include <cstring>
 #include <limits>
 
+#include "plumbline/core/shortage.hpp"
+
 namespace plumbline::evaluate {
 namespace {
 
@@ -40,12 +42,12 @@ Eigen::Vector3d nearest_on_triangle(const Eigen::Vector3d& q, const Eigen::Vecto
 }
 
 TriangleIndex::TriangleIndex(const TriangleMesh& mesh)
-    : mesh_(mesh), device_(rtcNewDevice("set_affinity=0")), scene_(rtcNewScene(device_)) {
+    : mesh_(mesh), device_(core::made(rtcNewDevice("set_affinity=0"))), scene_(rtcNewScene(device_)) {
   RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
-  void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                           sizeof(mesh.vertices[0]), mesh.vertices.size());
-  void* triangles = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                            sizeof(mesh.triangles[0]), mesh.triangles.size());
+  void* vertices = core::made(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                      sizeof(mesh.vertices[0]), mesh.vertices.size()));
+  void* triangles = core::made(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                                       sizeof(mesh.triangles[0]), mesh.triangles.size()));
   std::memcpy(vertices, mesh.vertices.data(), sizeof(mesh.vertices[0]) * mesh.vertices.size());
   std::memcpy(triangles, mesh.triangles.data(), sizeof(mesh.triangles[0]) * mesh.triangles.size());
   rtcCommitGeometry(geometry);

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <new>
 #include <stdexcept>
 #include <tuple>
 
@@ -41,7 +42,7 @@ void World::build_bvh() {
   // No "threads=" here: Embree would limit all of oneTBB in this process to that number for as long as the
   // device lives.
   device_ = rtcNewDevice("set_affinity=0");
-  if (device_ == nullptr) throw std::runtime_error("Embree: no device");
+  if (device_ == nullptr) throw std::bad_alloc();
 
   bvh_ = rtcNewScene(device_);
   rtcSetSceneFlags(bvh_, RTC_SCENE_FLAG_ROBUST);
@@ -58,6 +59,7 @@ void World::build_bvh() {
                                                         RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertices));
   auto* t = static_cast<unsigned*>(rtcSetNewGeometryBuffer(
       geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), triangles));
+  if (v == nullptr || t == nullptr) throw std::bad_alloc();
 
   unsigned base = 0;
   for (std::size_t i = 0; i < fixed_faces; ++i) {

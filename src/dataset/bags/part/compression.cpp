@@ -15,6 +15,8 @@
 #include <utility>
 #include <vector>
 
+#include "plumbline/core/shortage.hpp"
+
 namespace plumbline::dataset {
 namespace {
 
@@ -55,7 +57,7 @@ class ZstdInflater final : public Inflater {
   struct Free {
     void operator()(ZSTD_DCtx* context) const { ZSTD_freeDCtx(context); }
   };
-  std::unique_ptr<ZSTD_DCtx, Free> context_{ZSTD_createDCtx()};
+  std::unique_ptr<ZSTD_DCtx, Free> context_{core::made(ZSTD_createDCtx())};
   ZSTD_inBuffer input_;
   bool damaged_ = false;
 };
@@ -64,8 +66,8 @@ class Lz4Inflater final : public Inflater {
  public:
   Lz4Inflater(const std::uint8_t* data, std::size_t size) : data_(data), size_(size) {
     LZ4F_dctx* context = nullptr;
-    if (LZ4F_isError(LZ4F_createDecompressionContext(&context, LZ4F_VERSION)) != 0U) damaged_ = true;
-    context_.reset(context);
+    if (LZ4F_isError(LZ4F_createDecompressionContext(&context, LZ4F_VERSION)) != 0U) context = nullptr;
+    context_.reset(core::made(context));
   }
   std::size_t get(std::uint8_t* to, std::size_t size) override {
     std::size_t done = 0;
@@ -96,7 +98,7 @@ class Bzip2Inflater final : public Inflater {
  public:
   Bzip2Inflater(const std::uint8_t* data, std::size_t size) : left_(size) {
     stream_.next_in = const_cast<char*>(reinterpret_cast<const char*>(data));
-    damaged_ = BZ2_bzDecompressInit(&stream_, 0, 0) != BZ_OK;
+    if (BZ2_bzDecompressInit(&stream_, 0, 0) != BZ_OK) throw std::bad_alloc();  // the only way it can fail
   }
   ~Bzip2Inflater() override { BZ2_bzDecompressEnd(&stream_); }
   Bzip2Inflater(const Bzip2Inflater&) = delete;
@@ -204,7 +206,8 @@ core::Result<TemporaryFile> TemporaryFile::inflated(const std::filesystem::path&
   std::ifstream stream(file, std::ios::binary);
   std::vector<char> packed(ZSTD_DStreamInSize());
   std::vector<char> plain(ZSTD_DStreamOutSize());
-  const std::unique_ptr<ZSTD_DCtx, std::size_t (*)(ZSTD_DCtx*)> context(ZSTD_createDCtx(), &ZSTD_freeDCtx);
+  const std::unique_ptr<ZSTD_DCtx, std::size_t (*)(ZSTD_DCtx*)> context(core::made(ZSTD_createDCtx()),
+                                                                        &ZSTD_freeDCtx);
   std::size_t left = 1;
   cut = false;
 

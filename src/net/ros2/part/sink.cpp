@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "participant.hpp"
+#include "plumbline/core/shortage.hpp"
 #include "stream.hpp"
 
 namespace plumbline::net {
@@ -22,7 +23,7 @@ constexpr std::uint32_t kVersion1 = 1;
 class Sample {
  public:
   Sample(const dds_topic_descriptor_t& type, const std::vector<std::uint8_t>& bytes)
-      : type_(type), memory_(std::calloc(1, type.m_size)) {
+      : type_(type), memory_(core::made(std::calloc(1, type.m_size))) {
     ddsi_sertype_default sertype{};
     sertype.type.size = type.m_size;
     sertype.type.align = type.m_align;
