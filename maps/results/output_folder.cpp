@@ -145,7 +145,12 @@ void put_back(const fs::path& target, const fs::path& partial, const FolderKind&
 /// Removes the earlier result that a run has replaced.
 void drop_replaced(const fs::path& target, const FolderKind& kind) {
   const fs::path old = replaced_of(target);
-  if (!is_replaced(old, kind)) return;
+  std::error_code not_empty;
+  if (!is_replaced(old, kind)) {
+    if (!is_there(old)) fs::remove(old, not_empty);  // the end of a removal that was interrupted
+    return;
+  }
+
   const auto dropped = discard(old, kind);
   (void)dropped;  // the next run that replaces the result tries it again
 }
