@@ -48,22 +48,22 @@ TEST_F(OutputFolderOfARun, WhatAppearsWhileItMapsIsKept) {
 }
 
 TEST_F(OutputFolderOfARun, FilesThatUsersPutIntoAResultAreKept) {
-  const std::string map =
-      std::string("map wall -o out -p known_poses --set output.exports=grid.yaml") + kCheap;
+  const std::string map = std::string("map wall -o out") + kCheap +
+                          " --set 'output.exports=[room.las, {file: model, format: colmap}]'";
   ASSERT_EQ(run(map).code, 0);
   ASSERT_EQ(run("report out -q").code, 0);
   fs::create_directories(path("out/photos"));
   write("out/photos/desk.jpg", "mine");
   const Outcome refused = run(map + " --force");
   EXPECT_EQ(refused.code, 2) << refused;
-  EXPECT_TRUE(refused.told("photos/desk.jpg") && !refused.told("grid")) << refused;
+  EXPECT_TRUE(refused.told("with it: photos/desk.jpg; move")) << refused;
   EXPECT_EQ(slurp(path("out/photos/desk.jpg")), "mine");
 
   fs::rename(path("out/photos"), path("photos"));
   const Outcome replaced = run(map + " --force");
   EXPECT_EQ(replaced.code, 0) << replaced;
   EXPECT_FALSE(fs::exists(path("out/report.html"))) << "it was of the earlier result";
-  EXPECT_TRUE(fs::exists(path("out/grid.pgm")));
+  EXPECT_TRUE(fs::exists(path("out/room.las")) && fs::exists(path("out/model/sparse/0/cameras.bin")));
   EXPECT_FALSE(fs::exists(path("out.replaced")));
 }
 
@@ -80,8 +80,8 @@ TEST_F(OutputFolderOfARun, ThatIsRemovedIsAnOutputError) {
 }
 
 TEST_F(OutputFolderOfARun, AFusionKeepsWhatAppearsAsWell) {
-  ASSERT_EQ(run(std::string("map wall -o a -p robot --to 0.8 -q")).code, 0);
-  ASSERT_EQ(run(std::string("map wall -o b -p robot --from 0.2 -q")).code, 0);
+  ASSERT_EQ(run(std::string("map wall -o a") + kCheap).code, 0);
+  fs::copy(path("a"), path("b"), fs::copy_options::recursive);
   const Outcome o = run_beside("fuse a b -o out -q --set output.views=iso", "out.partial/config.yaml",
                                "mkdir out; echo mine >out/notes.txt");
   EXPECT_EQ(o.code, 5) << o;
@@ -94,15 +94,17 @@ TEST_F(OutputFolderOfARun, FewFilesOrLittleMemoryAreNoFaultOfTheInput) {
   EXPECT_EQ(files.code, 5) << files;
   EXPECT_TRUE(files.told("ulimit -n")) << files;
 
-  // An address space that is enough for the program and some of its parts.
-  ASSERT_EQ(run(std::string("map wall -o whole") + kCheap).code, 0);
-  for (const char* mb : {"300", "500"}) {
-    const Outcome o = run(std::string("map wall -o out --threads 1 --force") + kCheap,
-                          "ulimit -v " + std::string(mb) + "000; ");
-    EXPECT_TRUE(o.code == 5 || o.code == 0) << mb << o;
-    EXPECT_TRUE(o.code == 0 || o.told("not enough memory") || o.told("no further thread")) << mb << o;
+  // Address spaces from hardly enough to start with to nearly enough.
+#ifndef __SANITIZE_ADDRESS__
+  for (const std::string mb : {"250", "300", "500"}) {
+    const Outcome o =
+        run("map wall -o out --threads 1 --force" + std::string(kCheap), "ulimit -v " + mb + "000; ");
+    const bool not_started = o.code == 127;  // the dynamic linker's own words
+    EXPECT_TRUE(o.code == 0 || o.code == 5 || not_started) << mb << o;
+    EXPECT_TRUE(o.code != 5 || o.told("not enough memory") || o.told("no further thread")) << mb << o;
     EXPECT_FALSE(o.told("install") || o.told("damaged") || o.told("report it")) << mb << o;
   }
+#endif
 }
 
 }  // namespace
