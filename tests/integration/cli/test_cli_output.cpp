@@ -95,7 +95,7 @@ TEST_F(OutputFolderOfARun, FewFilesOrLittleMemoryAreNoFaultOfTheInput) {
   EXPECT_TRUE(files.told("ulimit -n")) << files;
 
   // Address spaces from hardly enough to start with to nearly enough.
-#ifndef __SANITIZE_ADDRESS__
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   for (const std::string mb : {"250", "300", "500"}) {
     const Outcome o =
         run("map wall -o out --threads 1 --force" + std::string(kCheap), "ulimit -v " + mb + "000; ");
