@@ -142,6 +142,12 @@ void put_back(const fs::path& target, const fs::path& partial, const FolderKind&
   fs::remove(target / kReplaced, ec);
 }
 
+/// Removes the marker of a complete result, unless it is needed to recognise its files.
+void drop_marker(const fs::path& target, const FolderKind& kind) {
+  std::error_code ignored;
+  if (!kind.stays_marked && read_notes(target).files.empty()) fs::remove(target / kFiles, ignored);
+}
+
 /// Removes the earlier result that a run has replaced.
 void drop_replaced(const fs::path& target, const FolderKind& kind) {
   const fs::path old = replaced_of(target);
@@ -227,13 +233,13 @@ core::Result<OutputFolder> OutputFolder::begin(const fs::path& target, FileLock 
   }
 
   OutputFolder folder(target, lock.release(), replace, kind);
+  folder.kept_ = takes_over;  // whatever follows: what is there already is somebody's map
   const fs::space_info space = fs::space(partial, ec);
   if (!ec && space.available < kLeastFreeMb * kMegabyte) {
     return core::output_error(fmt::format("{}: only {} MB are free there; at least {} MB are needed",
                                           target.string(), space.available / kMegabyte, kLeastFreeMb));
   }
 
-  folder.kept_ = takes_over;
   return folder;
 }
 
@@ -242,6 +248,7 @@ core::Result<bool> OutputFolder::finish(const fs::path& out, bool replace, const
   const fs::path partial = with_ending(target, ".partial");
   if (!is_there(partial)) {
     if (!kind.is_earlier(target)) return false;
+    drop_marker(target, kind);
     drop_replaced(target, kind);
     return true;
   }
@@ -331,7 +338,7 @@ core::Result<void> OutputFolder::put_in_place() {
   }
 
   partial_.clear();
-  if (!kind_->stays_marked && read_notes(target_).files.empty()) fs::remove(target_ / kFiles, ec);
+  drop_marker(target_, *kind_);
   drop_replaced(target_, *kind_);
   return {};
 }
