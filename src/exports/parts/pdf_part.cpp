@@ -45,7 +45,7 @@ void draw_text(cairo_t* cairo, const DrawnText& text, const DrawingSheet& sheet)
   const Eigen::Vector2d at = sheet.on_paper(text.at);
   cairo_save(cairo);
   cairo_translate(cairo, at.x(), at.y());
-  cairo_rotate(cairo, -text.angle_rad);
+  cairo_rotate(cairo, -readable_angle(text.angle_rad));
   cairo_set_font_size(cairo, 1.4 * sheet.per_metre_mm * text.height_m);
   cairo_text_extents_t extents;
   cairo_text_extents(cairo, text.text.c_str(), &extents);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdlib>
 
 #include "plumbline/core/output_file.hpp"
@@ -106,7 +107,7 @@ core::Result<void> write_svg(const std::filesystem::path& file, const Drawing& d
           "<text transform=\"translate({:.3f} {:.3f}) rotate({:.2f})\" font-family=\"sans-serif\" "
           "font-size=\"{:.2f}\" text-anchor=\"middle\" dy=\"0.35em\" fill=\"{}\" "
           "stroke=\"none\">{}</text>\n",
-          at.x(), at.y(), -text.angle_rad * 180.0 / 3.14159265358979,
+          at.x(), at.y(), -readable_angle(text.angle_rad) * 180.0 / M_PI,
           1.4 * sheet.per_metre_mm * text.height_m, l.color, escaped(text.text)));
     }
 

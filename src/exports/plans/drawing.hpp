@@ -3,6 +3,7 @@
 
 // A drawing in metres, and its files: SVG, PDF and DXF.
 #include <Eigen/Core>
+#include <cmath>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -30,9 +31,16 @@ struct DrawnText {
   std::size_t layer = 0;
   Eigen::Vector2d at = Eigen::Vector2d::Zero();  ///< its middle
   double height_m = 0.15;
-  double angle_rad = 0.0;
+  double angle_rad = 0.0;  ///< of the line that it stands on, which may run either way
   std::string text;
 };
+
+/// The angle, or the opposite one, at which a text along this line is read from below or from the right: in
+/// (-88, 92] degrees, so that lines that are vertical but for errors of measurement are read from one side.
+inline double readable_angle(double angle_rad) {
+  constexpr double kHighest_rad = 92.0 / 180.0 * M_PI;
+  return angle_rad - M_PI * std::ceil((angle_rad - kHighest_rad) / M_PI);
+}
 
 struct Drawing {
   std::string title;

@@ -199,7 +199,7 @@ void put_entities(DxfText& dxf, const Drawing& drawing, const Eigen::Matrix2d& t
                   const Eigen::Vector2d& origin) {
   dxf.put(0, "SECTION");
   dxf.put(2, "ENTITIES");
-  const double turned = std::atan2(turn(1, 0), turn(0, 0)) * 180.0 / M_PI;
+  const double turned_rad = std::atan2(turn(1, 0), turn(0, 0));
   const double scale = turn.col(0).norm();
 
   for (const DrawnLine& line : drawing.lines) {
@@ -233,7 +233,7 @@ void put_entities(DxfText& dxf, const Drawing& drawing, const Eigen::Matrix2d& t
 
     dxf.put(40, scale * text.height_m);
     dxf.put(1, text.text);
-    dxf.put(50, text.angle_rad * 180.0 / M_PI + turned);
+    dxf.put(50, readable_angle(text.angle_rad + turned_rad) * 180.0 / M_PI);
     dxf.put(72, 1);
     dxf.point(11, at);
     dxf.put(100, "AcDbText");

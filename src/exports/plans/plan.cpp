@@ -43,13 +43,6 @@ std::vector<std::pair<double, double>> solid_pieces(const WallLine& wall) {
   return pieces;
 }
 
-/// So that text is read from below or from the right.
-double readable(double angle) {
-  while (angle > M_PI / 2.0 + 1e-3) angle -= M_PI;
-  while (angle <= -M_PI / 2.0 + 1e-3) angle += M_PI;
-  return angle;
-}
-
 void draw_walls(const WallPlan& plan, const PlanLayers& layers, Drawing& drawing) {
   constexpr double kDimensioned_m = 1.0;
   constexpr double kBeside_m = 0.16;
@@ -60,7 +53,7 @@ void draw_walls(const WallPlan& plan, const PlanLayers& layers, Drawing& drawing
     text.layer = layers.dimensions;
     text.at = wall.at(0.5 * (wall.s0 + wall.s1)) + kBeside_m * wall.normal;
     text.height_m = kPlanText_m;
-    text.angle_rad = readable(std::atan2(wall.along().y(), wall.along().x()));
+    text.angle_rad = std::atan2(wall.along().y(), wall.along().x());
     text.text = fmt::format("{:.2f}", wall.length());
     drawing.texts.push_back(text);
     for (const double s : {wall.s0, wall.s1})  // where the length is measured
