@@ -9,7 +9,7 @@
 #include <map>
 #include <utility>
 
-#include "plumbline/geometry/alignment.hpp"
+#include "body.hpp"
 
 namespace plumbline::evaluate {
 namespace {
@@ -37,6 +37,10 @@ core::Result<void> check_options(const TrajectoryOptions& options) {
   return {};
 }
 
+bool fits_positions(TrajectoryAlignment align) {
+  return align == TrajectoryAlignment::kSe3 || align == TrajectoryAlignment::kSim3;
+}
+
 core::Result<Trajectory> checked(const char* which, const Trajectory& given) {
   if (given.empty()) return core::input_error(fmt::format("the {} trajectory has no poses", which));
   for (std::size_t i = 0; i < given.size(); ++i) {
@@ -52,14 +56,8 @@ core::Result<Trajectory> checked(const char* which, const Trajectory& given) {
   return sorted;
 }
 
-struct Match {
-  double stamp;
-  Rigid3 estimate;  ///< in its own world
-  Rigid3 truth;
-};
-
 struct Matches {
-  std::vector<Match> pairs;
+  std::vector<MatchedPose> pairs;
   std::size_t ambiguous = 0;  ///< poses that share a stamp, of which the truth has another number there
 };
 
@@ -130,25 +128,13 @@ std::string ambiguous_message(std::size_t ambiguous) {
       ambiguous);
 }
 
-Rigid3 alignment(const std::vector<Match>& matches, TrajectoryAlignment align) {
-  if (align == TrajectoryAlignment::kNone) return {};
-  if (align == TrajectoryAlignment::kStart) return matches.front().truth * matches.front().estimate.inverse();
-  std::vector<Eigen::Vector3d> source;
-  std::vector<Eigen::Vector3d> target;
-  for (const Match& m : matches) {
-    source.push_back(m.estimate.translation);
-    target.push_back(m.truth.translation);
-  }
-  return geometry::align_points(source, target);
-}
-
 /// The rotation about a path along one line, or at one place, is not determined by its positions.
-bool positions_fix_rotation(const std::vector<Match>& matches) {
+bool positions_fix_rotation(const std::vector<MatchedPose>& matches) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const Match& m : matches) mean += m.truth.translation;
+  for (const MatchedPose& m : matches) mean += m.truth.translation;
   mean /= static_cast<double>(matches.size());
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
-  for (const Match& m : matches) {
+  for (const MatchedPose& m : matches) {
     const Eigen::Vector3d d = m.truth.translation - mean;
     scatter += d * d.transpose();
   }
@@ -157,10 +143,25 @@ bool positions_fix_rotation(const std::vector<Match>& matches) {
   return variance(1) > 1e-6;  // 1 mm across the main direction
 }
 
-PoseError pose_error(const Match& m, const Rigid3& truth_from_estimate) {
+/// Finds the body whose poses the truth holds, and takes it out of the truth if the options say so.
+core::Result<std::optional<BodyReport>> take_body_out(const TrajectoryOptions& options,
+                                                      std::vector<MatchedPose>& matches, Trajectory& truth) {
+  if (options.body.empty()) return notable_body(matches, options.align);
+  const auto body = options.body == "fit" ? fit_body(matches, options.align == TrajectoryAlignment::kSim3)
+                                          : parse_body(options.body);
+  if (!body) return tl::unexpected(body.error());
+
+  BodyReport report = body_report(matches, options.align, *body);
+  report.removed = true;
+  for (MatchedPose& m : matches) m.truth = m.truth * *body;
+  for (StampedPose& pose : truth) pose.world_from_camera = pose.world_from_camera * *body;
+  return report;
+}
+
+PoseError pose_error(const MatchedPose& m, const geometry::ScaledRigid3& truth_from_estimate) {
   PoseError e;
   e.stamp = m.stamp;
-  e.estimate = truth_from_estimate * m.estimate;
+  e.estimate = aligned(truth_from_estimate, m.estimate);
   e.truth = m.truth;
   e.error_m = e.estimate.translation - e.truth.translation;
   e.distance_m = e.error_m.norm();
@@ -265,12 +266,23 @@ void add_tracked_share(const Trajectory& estimate, const std::vector<long long>&
     report.first_pose_s = 1e-4 * static_cast<double>(tracked.front() - frame_keys.front());
 }
 
-void add_warnings(const std::vector<Match>& matches, TrajectoryReport& report) {
-  if (report.align == TrajectoryAlignment::kSe3 && !positions_fix_rotation(matches)) {
+std::string scale_warning(const ScaleReport& scale) {
+  return fmt::format(
+      "the estimate is {:.2f} % too {}: it fits the truth at {:.4f} of its size, standard deviation {:.4f}; "
+      "its depth unit or focal length may be wrong",
+      100.0 * std::abs(1.0 / scale.value - 1.0), scale.value < 1.0 ? "large" : "small", scale.value,
+      scale.sigma);
+}
+
+void add_warnings(const std::vector<MatchedPose>& matches, TrajectoryReport& report) {
+  if (fits_positions(report.align) && !positions_fix_rotation(matches)) {
     report.warnings.push_back(
         "the matched positions lie on one line or at one place: the alignment's rotation is not determined, "
         "and ATE says little");
   }
+
+  if (report.scale && !report.scale->doubtful) report.warnings.push_back(scale_warning(*report.scale));
+  if (report.body && !report.body->removed) report.warnings.push_back(body_warning(*report.body));
 
   if (2 * report.matched < report.estimated) {
     report.warnings.push_back(
@@ -297,8 +309,13 @@ void TrajectoryOptions::declare(core::OptionTable& table) {
       "align", align,
       {{"none", TrajectoryAlignment::kNone},
        {"se3", TrajectoryAlignment::kSe3},
+       {"sim3", TrajectoryAlignment::kSim3},
        {"start", TrajectoryAlignment::kStart}},
-      "Alignment of the estimate with the truth: none, least squares over all positions, or first pose");
+      "Alignment of the estimate with the truth: none, least squares over all positions (sim3: with a "
+      "scale), or first pose");
+  table.text("body", body,
+             "Pose of the camera in the body whose poses the truth holds, x,y,z,qx,qy,qz,qw, to take it out; "
+             "fit: find it from the motion");
   table.number("max_dt", max_dt_s, {1e-4, 10.0}, "s",
                "The truth is interpolated, but not over gaps longer than twice this");
   table.integer("rpe_frames", rpe_frames, {1, 100000}, "",
@@ -319,8 +336,8 @@ core::Result<TrajectoryReport> evaluate_trajectory(const Trajectory& estimate, c
     if (!std::isfinite(s)) return core::input_error("the list of frames has a stamp that is not finite");
   }
 
-  const auto [matches, ambiguous] = match(*sorted_estimate, *sorted_truth, options.max_dt_s);
-  const std::size_t needed = options.align == TrajectoryAlignment::kSe3 ? 3 : 1;
+  auto [matches, ambiguous] = match(*sorted_estimate, *sorted_truth, options.max_dt_s);
+  const std::size_t needed = fits_positions(options.align) ? 3 : 1;
   if (matches.size() < needed) {
     return core::input_error(
         too_few_message(matches.size(), needed, *sorted_estimate, *sorted_truth, options.max_dt_s) +
@@ -333,10 +350,16 @@ core::Result<TrajectoryReport> evaluate_trajectory(const Trajectory& estimate, c
   report.rpe_seconds = options.rpe_seconds;
   report.estimated = sorted_estimate->size();
   report.matched = matches.size();
+  auto body = take_body_out(options, matches, *sorted_truth);
+  if (!body) return tl::unexpected(body.error());
+  report.body = *body;
   report.truth = std::move(*sorted_truth);
-  report.truth_from_estimate = alignment(matches, options.align);
 
-  for (const Match& m : matches) report.poses.push_back(pose_error(m, report.truth_from_estimate));
+  const geometry::ScaledRigid3 alignment = align_path(matches, options.align);
+  report.truth_from_estimate = alignment.rigid;
+  if (options.align == TrajectoryAlignment::kSim3) report.scale = scale_report(matches, alignment.scale);
+
+  for (const MatchedPose& m : matches) report.poses.push_back(pose_error(m, alignment));
   for (std::size_t i = 0; i + 1 < matches.size(); ++i) {
     report.path_m += (matches[i + 1].truth.translation - matches[i].truth.translation).norm();
   }

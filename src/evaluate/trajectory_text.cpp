@@ -16,7 +16,17 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 const char* name_of(TrajectoryAlignment align) {
-  return align == TrajectoryAlignment::kNone ? "none" : align == TrajectoryAlignment::kSe3 ? "se3" : "start";
+  switch (align) {
+    case TrajectoryAlignment::kNone:
+      return "none";
+    case TrajectoryAlignment::kSe3:
+      return "se3";
+    case TrajectoryAlignment::kSim3:
+      return "sim3";
+    case TrajectoryAlignment::kStart:
+      break;
+  }
+  return "start";
 }
 
 Json json_of(const Statistics& s) {
@@ -36,6 +46,18 @@ Json json_of(const geometry::Rigid3& t) {
   const Eigen::Quaterniond q = t.quaternion();
   return {{"translation_m", {t.translation.x(), t.translation.y(), t.translation.z()}},
           {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
+}
+
+Json json_of(const BodyReport& body) {
+  Json out = json_of(body.body_from_camera);
+  out["lever_m"] = body.lever_m;
+  out["turn_deg"] = body.turn_deg;
+  out["removed"] = body.removed;
+  out["ate_before_m"] = body.ate_before_m;
+  out["ate_after_m"] = body.ate_after_m;
+  out["orientation_before_deg"] = body.orientation_before_deg;
+  out["orientation_after_deg"] = body.orientation_after_deg;
+  return out;
 }
 
 std::string row(const std::string& name, const Statistics& s, const char* unit) {
@@ -71,6 +93,11 @@ Json json_of(const TrajectoryReport& r) {
   out["duration_s"] = r.duration_s;
   out["alignment"] = json_of(r.truth_from_estimate);
   out["alignment"]["type"] = name_of(r.align);
+  if (r.scale) {
+    out["alignment"]["scale"] = r.scale->value;
+    out["alignment"]["scale_sigma"] = r.scale->sigma;
+  }
+  if (r.body) out["body"] = json_of(*r.body);
   out["warnings"] = r.warnings;
 
   for (const ComponentReport& c : r.components) {
@@ -121,18 +148,25 @@ std::string to_json(const std::vector<NamedReport>& reports) {
 
 std::string to_text(const std::vector<NamedReport>& reports) {
   std::size_t width = 8;
-  for (const NamedReport& named : reports) width = std::max(width, named.name.size());
-  std::string out = fmt::format("{:<{}} {:>10} {:>10} {:>10} {:>10} {:>10} {:>9} {:>9}\n", "estimate", width,
-                                "ATE rmse", "median", "max", "RPE/s m", "RPE/s deg", "matched", "tracked");
+  bool scaled = false;
+  for (const NamedReport& named : reports) {
+    width = std::max(width, named.name.size());
+    scaled = scaled || named.report.scale;
+  }
+
+  std::string out =
+      fmt::format("{:<{}} {:>10} {:>10} {:>10} {:>10} {:>10} {:>9} {:>9}{}\n", "estimate", width, "ATE rmse",
+                  "median", "max", "RPE/s m", "RPE/s deg", "matched", "tracked", scaled ? "     scale" : "");
   for (const NamedReport& named : reports) {
     const TrajectoryReport& r = named.report;
     const auto relative = [&](const Statistics& s) {
       return r.rpe_second.pairs > 0 ? fmt::format("{:.6f}", s.rmse) : std::string("-");
     };
-    out += fmt::format("{:<{}} {:>10.6f} {:>10.6f} {:>10.6f} {:>10} {:>10} {:>9} {:>9}\n", named.name, width,
-                       r.ate_m.rmse, r.ate_m.median, r.ate_m.max, relative(r.rpe_second.translation_m),
+    out += fmt::format("{:<{}} {:>10.6f} {:>10.6f} {:>10.6f} {:>10} {:>10} {:>9} {:>9}{}\n", named.name,
+                       width, r.ate_m.rmse, r.ate_m.median, r.ate_m.max, relative(r.rpe_second.translation_m),
                        relative(r.rpe_second.rotation_deg), r.matched,
-                       r.tracked_percent ? fmt::format("{:.2f} %", *r.tracked_percent) : "-");
+                       r.tracked_percent ? fmt::format("{:.2f} %", *r.tracked_percent) : "-",
+                       r.scale ? fmt::format(" {:>9.5f}", r.scale->value) : "");
   }
   return out;
 }
@@ -142,6 +176,18 @@ std::string to_text(const TrajectoryReport& r) {
                                 r.matched, r.estimated, name_of(r.align), r.path_m, r.duration_s);
   if (r.tracked_percent) out += fmt::format("tracked {:.2f} % of {} frames\n", *r.tracked_percent, *r.frames);
   if (r.first_pose_s) out += fmt::format("first pose after {:.3f} s\n", *r.first_pose_s);
+
+  if (r.scale)
+    out += fmt::format("scale {:.5f}, standard deviation {:.5f} (true length / estimated length)\n",
+                       r.scale->value, r.scale->sigma);
+  if (r.body && r.body->removed) {
+    const Eigen::Vector3d& at = r.body->body_from_camera.translation;
+    out += fmt::format(
+        "taken out of the truth: the camera is at {:.4f} {:.4f} {:.4f} m in its body ({:.1f} cm away), "
+        "turned by "
+        "{:.2f} degrees; ATE rmse was {:.6f} m\n",
+        at.x(), at.y(), at.z(), 100.0 * r.body->lever_m, r.body->turn_deg, r.body->ate_before_m);
+  }
 
   out += fmt::format("{:<22} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10}\n", "", "rmse", "mean", "median",
                      "min", "max", "std");

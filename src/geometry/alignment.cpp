@@ -38,4 +38,30 @@ Rigid3 align_points(const std::vector<Eigen::Vector3d>& source, const std::vecto
   return {t.topLeftCorner<3, 3>(), t.topRightCorner<3, 1>()};
 }
 
+ScaledRigid3 align_points_scaled(const std::vector<Eigen::Vector3d>& source,
+                                 const std::vector<Eigen::Vector3d>& target) {
+  ScaledRigid3 result;
+  result.rigid = align_points(source, target);  // the best rotation does not depend on the scale
+  if (source.empty()) return result;
+
+  Eigen::Vector3d source_mean = Eigen::Vector3d::Zero();
+  Eigen::Vector3d target_mean = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < source.size(); ++i) {
+    source_mean += source[i] / static_cast<double>(source.size());
+    target_mean += target[i] / static_cast<double>(source.size());
+  }
+
+  double common = 0.0;
+  double spread = 0.0;
+  for (std::size_t i = 0; i < source.size(); ++i) {
+    const Eigen::Vector3d way = source[i] - source_mean;
+    common += (target[i] - target_mean).dot(result.rigid.rotation * way);
+    spread += way.squaredNorm();
+  }
+
+  if (spread > 0.0) result.scale = common / spread;
+  result.rigid.translation = target_mean - result.scale * (result.rigid.rotation * source_mean);
+  return result;
+}
+
 }  // namespace plumbline::geometry

@@ -19,11 +19,15 @@ namespace plumbline::evaluate {
 enum class TrajectoryAlignment {
   kNone,   ///< compared as they are
   kSe3,    ///< least squares over all matched positions (Horn 1987)
+  kSim3,   ///< the same with a scale (Umeyama 1991)
   kStart,  ///< the first matched pose of the estimate is moved onto the truth
 };
 
 struct TrajectoryOptions {
   TrajectoryAlignment align = TrajectoryAlignment::kSe3;
+  /// Pose of the camera in the body whose poses the truth holds, "x,y,z,qx,qy,qz,qw"; "fit": found from the
+  /// motion; empty: the truth is the camera's.
+  std::string body;
   double max_dt_s = 0.02;    ///< truth is interpolated; gaps over 2*max_dt_s are not bridged
   int rpe_frames = 1;        ///< frames between the two poses of an RPE pair
   double rpe_seconds = 1.0;  ///< seconds between the two poses of an RPE pair
@@ -55,11 +59,32 @@ struct ComponentReport {
   Statistics ate_m;               ///< zero when too few poses have truth
 };
 
+/// Factor on the lengths of an estimate, such as one of wrong depth units.
+struct ScaleReport {
+  double value = 1.0;    ///< true length / estimated length
+  double sigma = 0.0;    ///< standard deviation, from leaving out a tenth of the path at a time
+  bool doubtful = true;  ///< true: it does not differ from 1 by more than chance may do
+};
+
+/// The constant pose of the camera in a body whose poses the truth holds.
+struct BodyReport {
+  geometry::Rigid3 body_from_camera;
+  double lever_m = 0.0;
+  double turn_deg = 0.0;
+  bool removed = false;  ///< true: the errors of the report are those without it; false: it was only found
+  double ate_before_m = 0.0;  ///< RMS while it is in
+  double ate_after_m = 0.0;   ///< RMS with it taken out
+  double orientation_before_deg = 0.0;
+  double orientation_after_deg = 0.0;
+};
+
 struct TrajectoryReport {
   TrajectoryAlignment align = TrajectoryAlignment::kSe3;
-  geometry::Rigid3 truth_from_estimate;
-  std::size_t estimated = 0;  ///< poses in the estimate
-  std::size_t matched = 0;    ///< number of these with truth at their stamp
+  geometry::Rigid3 truth_from_estimate;  ///< without the scale
+  std::optional<ScaleReport> scale;      ///< with kSim3
+  std::optional<BodyReport> body;        ///< if it was given, fitted, or found to matter
+  std::size_t estimated = 0;             ///< poses in the estimate
+  std::size_t matched = 0;               ///< number of these with truth at their stamp
   Statistics ate_m;
   Statistics rotation_deg;              ///< orientation error after the alignment
   std::array<Statistics, 3> axis_m;     ///< |error| along x, y, z
@@ -83,11 +108,15 @@ struct TrajectoryReport {
 
 /// `frame_stamps`: stamps of the recording's colour frames (seconds), empty when unknown.
 /// Errors (kInput): an empty side, a value that is not finite, no overlap in time (both ranges are reported),
-/// fewer than 3 matched poses (1 unless align is kSe3). kUsage: an option out of range.
+/// fewer than 3 matched poses (1 with kNone and kStart), a body that the motion does not determine. kUsage:
+/// an option out of range.
 core::Result<TrajectoryReport> evaluate_trajectory(const geometry::Trajectory& estimate,
                                                    const geometry::Trajectory& truth,
                                                    const TrajectoryOptions& options = {},
                                                    const std::vector<double>& frame_stamps = {});
+
+/// A pose as the text of TrajectoryOptions::body, without loss.
+std::string body_text(const geometry::Rigid3& body_from_camera);
 
 /// Stamps of a list such as TUM's rgb.txt: the first column of every line that is not a comment; sorted.
 core::Result<std::vector<double>> read_frame_stamps(const std::filesystem::path& list);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Least-squares rigid alignment of point sets.
+// Least-squares alignment of point sets, rigid or with a scale.
 #include <vector>
 
 #include "plumbline/geometry/rigid3.hpp"
@@ -13,5 +13,17 @@ namespace plumbline::geometry {
 /// Collinear points, which leave the turn about their line free: the smallest rotation that lays line on
 /// line.
 Rigid3 align_points(const std::vector<Eigen::Vector3d>& source, const std::vector<Eigen::Vector3d>& target);
+
+/// A similarity: target = scale * rotation * source + translation.
+struct ScaledRigid3 {
+  double scale = 1.0;
+  Rigid3 rigid;  ///< its rotation and translation
+
+  Eigen::Vector3d operator*(const Eigen::Vector3d& p) const { return rigid * (scale * p); }
+};
+/// The same with the scale that minimises sum |target_i - scale R source_i - t|^2 (Umeyama 1991); 1 if all
+/// source points are one.
+ScaledRigid3 align_points_scaled(const std::vector<Eigen::Vector3d>& source,
+                                 const std::vector<Eigen::Vector3d>& target);
 
 }  // namespace plumbline::geometry

@@ -157,7 +157,10 @@ core::Result<std::vector<evaluate::NamedReport>> measure_paths(const TrajectoryR
     auto report =
         evaluate::evaluate_trajectory(estimate->poses, fitting_truth.poses, request.options, stamps);
     if (!report) return about(file, report.error());
-    report->components = measure_components(estimates[i], fitting_truth.poses, request.options);
+    evaluate::TrajectoryOptions of_components = request.options;
+    if (report->body && report->body->removed)  // too short to fit it to
+      of_components.body = evaluate::body_text(report->body->body_from_camera);
+    report->components = measure_components(estimates[i], fitting_truth.poses, of_components);
     reports.push_back({names[i], std::move(*report)});
   }
 

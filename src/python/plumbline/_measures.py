@@ -42,7 +42,7 @@ def evaluate_trajectory(
     """Absolute and relative pose error (ATE, RPE): `report["ate_m"]["rmse"]` and so on.
 
     estimate, truth  a Trajectory, a Result, a file, a result folder; truth also a recording's folder with groundtruth.txt
-    options          align ("se3", "start", "none"), max_dt ... as plumbline evaluate trajectory --help lists them
+    options          align ("se3", "sim3", "start", "none"), body ("fit"), max_dt ... as plumbline evaluate trajectory --help lists them
 
     Raises InputError (no overlap in time, fewer than 3 poses), ConfigError.
     """

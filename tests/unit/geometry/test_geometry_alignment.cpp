@@ -97,4 +97,29 @@ TEST(AlignPoints, DifferentSizesAreABrokenCall) {
 }
 
 }  // namespace
+TEST(AlignPointsScaled, FindsScaleRotationAndShift) {
+  const Rigid3 motion(exp_so3({0.3, -1.2, 0.5}), {1.0, -2.0, 3.0});
+  std::vector<Eigen::Vector3d> source{{0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {0.5, 0.3, 1.5}, {-1, 0.4, 0.2}};
+  std::vector<Eigen::Vector3d> target;
+  for (const Eigen::Vector3d& p : source) target.push_back(motion * (0.95 * p));
+  const geometry::ScaledRigid3 found = geometry::align_points_scaled(source, target);
+  EXPECT_NEAR(found.scale, 0.95, 1e-12);
+  EXPECT_LT((found.rigid.rotation - motion.rotation).norm(), 1e-12);
+  EXPECT_LT((found.rigid.translation - motion.translation).norm(), 1e-12);
+  EXPECT_LT((found * source[3] - target[3]).norm(), 1e-12);
+}
+
+TEST(AlignPointsScaled, OfALineAndOfOnePlace) {
+  const std::vector<Eigen::Vector3d> line{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {4, 0, 0}};
+  std::vector<Eigen::Vector3d> longer;
+  for (const Eigen::Vector3d& p : line) longer.emplace_back(1.0, 2.0 * p.x(), 0.0);
+  EXPECT_NEAR(geometry::align_points_scaled(line, longer).scale, 2.0, 1e-12);
+
+  const std::vector<Eigen::Vector3d> one(4, Eigen::Vector3d(1.0, 2.0, 3.0));
+  const geometry::ScaledRigid3 still = geometry::align_points_scaled(one, line);
+  EXPECT_EQ(still.scale, 1.0);
+  EXPECT_LT((still * one[0] - Eigen::Vector3d(1.75, 0, 0)).norm(), 1e-12);
+  EXPECT_EQ(geometry::align_points_scaled({}, {}).scale, 1.0);
+}
+
 }  // namespace plumbline::geometry
