@@ -2,9 +2,11 @@
 #pragma once
 
 // Occupancy grid of a map seen from above: occupied, free and unknown cells.
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
+#include "grids/rays.hpp"
 #include "source/map_source.hpp"
 
 namespace plumbline::exports {
@@ -25,9 +27,29 @@ struct Grid {
   }
 };
 
-/// Occupied: cells with several points of the cloud between --heights over the floor. Free: other cells
-/// that two or more camera rays cross at those heights. Errors: kInput (no free space known, not upright),
-/// kUsage (heights, or so fine that the grid would be larger than 2^28 cells).
+/// The range of heights in which things are obstacles, and the floor below it.
+struct GridHeights {
+  double floor_m = 0.0;
+  double low_m = 0.1;
+  double high_m = 1.8;
+
+  [[nodiscard]] bool is_obstacle(double z) const { return z >= low_m && z <= high_m; }
+  [[nodiscard]] bool is_floor(double z) const {
+    constexpr double kBand_m = 0.1;  // how far what is measured of a floor lies from it
+    return z < low_m && std::abs(z - floor_m) <= kBand_m;
+  }
+};
+
+/// Sets the cells of a grid, by the rule of make_grid, from a cloud, the cameras' path and the rays of their
+/// views. Errors: those of `views`.
+core::Result<void> set_cells(const cloud::CloudFile& cloud, const std::vector<ExportPose>& path,
+                             const ForEachView& views, const GridHeights& heights, Grid& grid);
+
+/// Occupied: cells in which something was measured between --heights over the floor, whatever else was seen
+/// there. Free: other cells whose floor was seen and above it nothing but air up to 1 m, or nothing but air
+/// over the whole of these heights, or where a body that carried the camera had room. Unknown: the rest, such
+/// as the inside of a cabinet. Errors: kInput (no free space known, not upright), kUsage (heights, or so fine
+/// that the grid would be larger than 2^28 cells).
 core::Result<Grid> make_grid(MapSource& source);
 
 }  // namespace plumbline::exports

@@ -58,18 +58,24 @@ core::Result<ExportSummary> write_nav2(MapSource& source, const std::filesystem:
 }  // namespace
 
 Format grid_format() {
-  return {"grid",
-          {".yaml", ".pgm"},
-          {Content::kCloud},
-          "map.db",
-          "Occupancy grid for Nav2",
-          "`NAME.yaml` and `NAME.pgm` for ROS' map_server, trinary. Occupied are cells with points between "
-          "`--heights` over the floor, so that neither floor nor ceiling is in it; free are the others that "
-          "cameras saw through at these heights; the rest is unknown. Both `free_thresh: 0.196` and the grey "
-          "value 205 are chosen so that unknown stays unknown: with map_server's usual 0.25 it would load as "
-          "free. The origin is the lower left corner in the map's frame, without a turn.",
-          {"resolution", "heights", "voxel"},
-          &write_nav2};
+  return {
+      "grid",
+      {".yaml", ".pgm"},
+      {Content::kCloud},
+      "map.db",
+      "Occupancy grid for Nav2",
+      "`NAME.yaml` and `NAME.pgm` for ROS' map_server, trinary. Occupied are cells in which anything was "
+      "measured between `--heights` over the floor, also where floor was seen below it, as under a table; "
+      "neither floor nor ceiling is in it. Free are other cells whose floor was seen and, up to 1 m over it, "
+      "the air (but for 5 cm at most, as a table top that cameras only looked along is not measured), cells "
+      "where the air was seen at all of `--heights`, and those where whoever carried the camera had room to "
+      "stand (at most 0.2 m around its path). The rest is unknown, also the inside of a cabinet over which "
+      "cameras looked. "
+      "Both `free_thresh: 0.196` and the grey value 205 are chosen so that unknown stays unknown: with "
+      "map_server's usual 0.25 it would load as free. The origin is the lower left corner in the map's "
+      "frame, without a turn.",
+      {"resolution", "heights", "voxel"},
+      &write_nav2};
 }
 
 }  // namespace plumbline::exports

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <functional>
 #include <string>
 
 #include "grids/rays.hpp"
@@ -16,8 +15,7 @@ struct OctreeWork {
   std::string frame;   ///< for the file's comment, one line
   const cloud::CloudFile* cloud = nullptr;
   Eigen::AlignedBox3d box;
-  /// Hands the rays of all views, one after another, to its argument.
-  std::function<core::Result<void>(const std::function<core::Result<void>(const ViewRays&)>&)> views;
+  ForEachView views;
 };
 
 /// Functions of the part "octomap".

@@ -15,6 +15,10 @@ struct ViewRays {
   std::vector<Eigen::Vector3f> ends;  ///< measured points
 };
 
+/// Hands the rays of all views, one after another, to its argument.
+using ForEachView =
+    std::function<core::Result<void>(const std::function<core::Result<void>(const ViewRays&)>&)>;
+
 /// Calls `take` with the rays of each view of the map, in order; of each view about one ray in 6 x 6 pixels.
 /// Progress is reported. Errors (kInput): no map.db, or damaged; those of `take`.
 core::Result<void> for_each_view(const MapSource& source,
