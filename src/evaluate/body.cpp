@@ -92,9 +92,11 @@ Vector3d fit_lever(const std::vector<Motion>& motions, const Matrix3d& turn, boo
   for (int round = 0; round < kRounds; ++round) {
     Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
     Eigen::Vector4d right = Eigen::Vector4d::Zero();
+
     for (std::size_t i = 0; i < motions.size(); ++i) {
       const Vector3d step = turn * motions[i].camera.translation;
       Eigen::Matrix<double, 3, 4> rows;
+
       rows << motions[i].body.rotation - Matrix3d::Identity(), scaled ? Vector3d(-step) : Vector3d::Zero();
       const Vector3d wanted = (scaled ? Vector3d::Zero() : step) - motions[i].body.translation;
       normal += weights[i] * rows.transpose() * rows;
@@ -148,6 +150,14 @@ std::pair<double, double> rms_errors(const std::vector<MatchedPose>& poses, Traj
   return {std::sqrt(squares_m / count), std::sqrt(squares_rad / count) / kDegree};
 }
 
+/// Usual difference of the turns of body and camera that a rotation between them leaves, radians.
+double usual_rest(const std::vector<Motion>& motions, const Matrix3d& turn) {
+  std::vector<double> rest;
+  rest.reserve(motions.size());
+  for (const Motion& m : motions) rest.push_back((m.body_turn - turn * m.camera_turn).norm());
+  return core::median(rest);
+}
+
 }  // namespace
 
 core::Result<Rigid3> parse_body(const std::string& text) {
@@ -176,7 +186,9 @@ std::string body_text(const Rigid3& body_from_camera) {
 
 core::Result<Rigid3> fit_body(const std::vector<MatchedPose>& poses, bool scaled) {
   constexpr std::size_t kFewest = 10;
-  constexpr double kLeastSecondTurn_rad = 2.0 * kDegree;
+  constexpr double kLeastSecondTurn_rad = 0.5 * kDegree;
+  constexpr double kOverNoise = 5.0;
+
   const std::vector<Motion> motions = turning_motions(poses);
   const char* remedy = "; if it is known, give it as --body x,y,z,qx,qy,qz,qw";
   if (motions.size() < kFewest) {
@@ -185,14 +197,16 @@ core::Result<Rigid3> fit_body(const std::vector<MatchedPose>& poses, bool scaled
         "poses), so that its pose in the body is not determined{}",
         motions.size(), remedy));
   }
-  if (const double second = second_turn(motions); second < kLeastSecondTurn_rad) {
+
+  const Matrix3d turn = fit_turn(motions);
+  const double second = second_turn(motions);
+  if (second < std::max(kLeastSecondTurn_rad, kOverNoise * usual_rest(motions, turn))) {
     return core::input_error(fmt::format(
-        "--body fit: the camera turns about one axis only ({:.1f} degrees about any other), so that "
+        "--body fit: the camera turns about one axis only ({:.2f} degrees about any other), so that "
         "its pose in the body is not determined{}",
         second / kDegree, remedy));
   }
 
-  const Matrix3d turn = fit_turn(motions);
   return Rigid3(turn, fit_lever(motions, turn, scaled));
 }
 
@@ -226,7 +240,7 @@ std::string body_warning(const BodyReport& body) {
       "the truth seems to hold the poses of a body, such as a marker or an IMU, in which the camera stays "
       "{:.1f} cm "
       "away and turned by {:.1f} degrees: with that taken out ATE is {:.4f} m instead of {:.4f} m, and the "
-      "orientation error {:.2f} degrees instead of {:.2f}; --body fit takes it out",
+      "orientation error {:.2f} degrees instead of {:.2f}; evaluate trajectory --body fit takes it out",
       100.0 * body.lever_m, body.turn_deg, body.ate_after_m, body.ate_before_m, body.orientation_after_deg,
       body.orientation_before_deg);
 }

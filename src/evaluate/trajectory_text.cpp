@@ -91,6 +91,7 @@ Json json_of(const TrajectoryReport& r) {
   out["first_pose_s"] = r.first_pose_s ? Json(*r.first_pose_s) : Json(nullptr);
   out["path_m"] = r.path_m;
   out["duration_s"] = r.duration_s;
+
   out["alignment"] = json_of(r.truth_from_estimate);
   out["alignment"]["type"] = name_of(r.align);
   if (r.scale) {
@@ -162,6 +163,7 @@ std::string to_text(const std::vector<NamedReport>& reports) {
     const auto relative = [&](const Statistics& s) {
       return r.rpe_second.pairs > 0 ? fmt::format("{:.6f}", s.rmse) : std::string("-");
     };
+
     out += fmt::format("{:<{}} {:>10.6f} {:>10.6f} {:>10.6f} {:>10} {:>10} {:>9} {:>9}{}\n", named.name,
                        width, r.ate_m.rmse, r.ate_m.median, r.ate_m.max, relative(r.rpe_second.translation_m),
                        relative(r.rpe_second.rotation_deg), r.matched,
@@ -180,6 +182,7 @@ std::string to_text(const TrajectoryReport& r) {
   if (r.scale)
     out += fmt::format("scale {:.5f}, standard deviation {:.5f} (true length / estimated length)\n",
                        r.scale->value, r.scale->sigma);
+
   if (r.body && r.body->removed) {
     const Eigen::Vector3d& at = r.body->body_from_camera.translation;
     out += fmt::format(

@@ -143,6 +143,21 @@ TEST(EvaluateBody, IsNotInventedWhereTheTruthIsTheCameras) {
   EXPECT_LT(same.ate_m.rmse, 1e-6);
 }
 
+TEST(EvaluateBody, IsFoundOfACameraThatHardlyTilts) {
+  Trajectory truth = path_of(1);
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    const double tilt = 1.5 * kDegree * std::sin(0.11 * static_cast<double>(i));
+    Rigid3& pose = truth[i].world_from_camera;
+    pose.rotation = pose.rotation * geometry::exp_so3({tilt, 0.0, 0.0});
+  }
+  const TrajectoryReport report = measured(tracked(truth), marker_path(truth), "fit");
+  ASSERT_TRUE(report.body);
+  const Rigid3 off = marker_from_camera().inverse() * report.body->body_from_camera;
+  EXPECT_LT(off.translation.norm(), 0.01);
+  EXPECT_LT(geometry::rotation_angle(off.rotation), 0.3 * kDegree);
+  EXPECT_LT(report.ate_m.rmse, 1.5 * kNoise_m);
+}
+
 TEST(EvaluateBody, IsFoundAmongOutliers) {
   const Trajectory truth = path_of(3);
   Trajectory estimate = tracked(truth);
