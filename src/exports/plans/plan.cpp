@@ -21,21 +21,27 @@ constexpr double kPlanText_m = 0.14;
 
 /// The layers of a plan, by their numbers in the drawing.
 struct PlanLayers {
-  std::size_t grid, rooms, path, walls, doors, dimensions;
+  std::size_t grid, rooms, path, walls, windows, doors, dimensions;
   explicit PlanLayers(Drawing& drawing)
       : grid(drawing.add_layer({"grid", "#d0d0d0", 8, 0.1})),
         rooms(drawing.add_layer({"rooms", "#3a6ea5", 5, 0.15})),
         path(drawing.add_layer({"path", "#c08020", 30, 0.15})),
         walls(drawing.add_layer({"walls", "#000000", 7, 0.6})),
+        windows(drawing.add_layer({"windows", "#3080a0", 4, 0.25})),
         doors(drawing.add_layer({"doors", "#b03030", 1, 0.25})),
         dimensions(drawing.add_layer({"dimensions", "#505050", 3, 0.13})) {}
 };
 
-/// The wall's pieces between its openings.
+/// The wall's pieces between its doors and gaps.
 std::vector<std::pair<double, double>> solid_pieces(const WallLine& wall) {
+  std::vector<WallOpening> openings = wall.openings;
+  openings.insert(openings.end(), wall.gaps.begin(), wall.gaps.end());
+  std::sort(openings.begin(), openings.end(),
+            [](const WallOpening& a, const WallOpening& b) { return a.s0 < b.s0; });
+
   std::vector<std::pair<double, double>> pieces;
   double from = wall.s0;
-  for (const WallOpening& opening : wall.openings) {
+  for (const WallOpening& opening : openings) {
     if (opening.s0 > from) pieces.emplace_back(from, opening.s0);
     from = std::max(from, opening.s1);
   }
@@ -48,6 +54,7 @@ void draw_walls(const WallPlan& plan, const PlanLayers& layers, Drawing& drawing
   constexpr double kBeside_m = 0.16;
   for (const WallLine& wall : plan.walls) {
     for (const auto& [a, b] : solid_pieces(wall)) drawing.line(layers.walls, wall.at(a), wall.at(b));
+    for (const WallOpening& gap : wall.gaps) drawing.line(layers.windows, wall.at(gap.s0), wall.at(gap.s1));
     if (wall.length() < kDimensioned_m) continue;
     DrawnText text;
     text.layer = layers.dimensions;
@@ -135,8 +142,11 @@ core::Result<Drawing> plan_drawing(MapSource& source, ExportSummary& summary) {
   draw_path(source, layers.path, drawing);
   draw_grid(layers.grid, layers.dimensions, drawing);
   drawing.title = fmt::format("{}: plan at {:g} m", source.name(), source.options().cut_m);
-  summary.notes.push_back(fmt::format("{} walls, {} doors, {} closed rooms", plan->walls.size(),
-                                      plan->doors.size(), plan->rooms.size()));
+  std::size_t gaps = 0;
+  for (const WallLine& wall : plan->walls) gaps += wall.gaps.size();
+  summary.notes.push_back(
+      fmt::format("{} walls, {} doors{}, {} closed rooms", plan->walls.size(), plan->doors.size(),
+                  gaps > 0 ? fmt::format(", {} windows or gaps at the cut", gaps) : "", plan->rooms.size()));
   if (!plan->rays_known) {
     summary.notes.emplace_back(
         "without map.db it is not known what cameras saw through: only doors below a lintel are found");
@@ -242,20 +252,26 @@ core::Result<ExportSummary> write_plan(MapSource& source, const std::filesystem:
 }  // namespace
 
 Format plan_format() {
-  return {"plan",
-          {".svg", ".pdf", ".dxf"},
-          {Content::kCloud},
-          "",
-          "Floor plan or section for architects",
-          "Walls at `--cut` over the floor as lines, fitted to the wall planes that `plumbline evaluate "
-          "cloud` finds and joined at corners, both sides of a wall where both were seen; furniture is left "
-          "out. Doors are where cameras looked through a wall (without `map.db`: what lies below a lintel); "
-          "closed doors are wall. Walls over 1 m have their length, closed rooms their area; a grid of "
-          "metres, a scale bar, the paths. SVG and PDF are in a round scale, which is written in the file; "
-          "DXF (R2000) is in metres with the layers grid, rooms, path, walls, doors, dimensions. `--section "
-          "x,y,x,y` draws a vertical cut along that line instead.",
-          {"cut", "section", "voxel", "datum", "epsg", "origin"},
-          &write_plan};
+  return {
+      "plan",
+      {".svg", ".pdf", ".dxf"},
+      {Content::kCloud},
+      "",
+      "Floor plan or section for architects",
+      "Walls at `--cut` over the floor as lines, fitted to the wall planes that `plumbline evaluate "
+      "cloud` finds and joined at corners, both sides of a wall where both were seen. What the cut passes "
+      "over is left out: a half-height wall of which both faces were seen is drawn where it is higher than "
+      "the cut. Where the cut passes through a window, or over a lower part, the wall is open, with a thin "
+      "line: cameras looked through, or surface was seen above and below and nothing stood in front, as at a "
+      "pane (or a dark screen on the wall). Furniture is left out. Doors are where cameras looked through a "
+      "wall (without `map.db`: what lies "
+      "below a lintel); closed doors are wall. Walls over 1 m have their length, closed rooms their area; "
+      "a grid of metres, a scale bar, the paths. SVG and PDF are in a round scale, which is written in the "
+      "file; DXF (R2000) is in metres with the layers grid, rooms, path, walls, windows, doors, dimensions. "
+      "Texts are read from below or from the right, also after `--datum`. `--section x,y,x,y` draws a "
+      "vertical cut along that line instead.",
+      {"cut", "section", "voxel", "datum", "epsg", "origin"},
+      &write_plan};
 }
 
 }  // namespace plumbline::exports

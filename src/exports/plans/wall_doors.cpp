@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "plans/wall_steps.hpp"
 
@@ -67,9 +68,14 @@ WallLine joined_pieces(const WallLine& a, const WallLine& b) {
   line.s0 = line.along().dot(a.at(a.s0));
   line.s1 = line.along().dot(b.at(b.s1));
   line.openings.clear();
+  line.gaps.clear();
   for (const WallLine* piece : {&a, &b}) {
-    for (const WallOpening& o : piece->openings)
-      line.openings.push_back({line.along().dot(piece->at(o.s0)), line.along().dot(piece->at(o.s1))});
+    const auto on_line = [&](const WallOpening& part) -> WallOpening {
+      return {line.along().dot(piece->at(part.s0)), line.along().dot(piece->at(part.s1))};
+    };
+    std::transform(piece->openings.begin(), piece->openings.end(), std::back_inserter(line.openings),
+                   on_line);
+    std::transform(piece->gaps.begin(), piece->gaps.end(), std::back_inserter(line.gaps), on_line);
   }
 
   line.corner[1] = b.corner[1];
@@ -134,10 +140,15 @@ void bridge_gaps(std::vector<WallLine>& walls, std::vector<Fronts>& fronts, cons
 
       const WallRaster& front = *fronts[i].last;
       const bool crossed = is_passage(front, front.column_at(a.at(a.s1)), front.column_at(b.at(b.s0)),
-                                      {cut.low_m, cut.high_m, true});
+                                      {cut.at_m, cut.low_m, cut.high_m, true});
       if (crossed && gap < kNarrowestDoor_m) continue;
 
-      if (crossed || !cut.rays_known) a.openings.push_back(widened(front, a, {a.s1, from}, cut));
+      if (crossed || !cut.rays_known) {
+        a.openings.push_back(widened(front, a, {a.s1, from}, cut));
+      } else {
+        const std::vector<WallOpening> gaps = gaps_between(front, a.s1, from, cut);
+        a.gaps.insert(a.gaps.end(), gaps.begin(), gaps.end());
+      }
       a = joined_pieces(a, b);
       fronts[i].last = fronts[j].last;
 

@@ -67,13 +67,40 @@ void keep_sides(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, 
   rasters = std::move(kept_rasters);
 }
 
+/// True if two sides are the faces of one thin wall: opposite each other for most of their length.
+bool are_faces(const WallLine& a, const WallLine& b) {
+  constexpr double kThinnest_m = 0.06;  // thicker than a door's leaf
+  constexpr double kThickest_m = 0.3;
+  constexpr double kShare = 0.6;
+  if (a.normal.dot(b.normal) > -0.99) return false;
+  const double behind = a.offset_m - a.normal.dot(b.at(0.5 * (b.s0 + b.s1)));
+  if (behind < kThinnest_m || behind > kThickest_m) return false;
+  const double first = a.along().dot(b.at(b.s1));  // the other face runs backwards
+  const double last = a.along().dot(b.at(b.s0));
+  return std::min(a.s1, last) - std::max(a.s0, first) > kShare * std::max(a.length(), b.length());
+}
+
 }  // namespace
+
+void drop_low_furniture(std::vector<WallLine>& walls) {
+  const std::vector<WallLine> all = walls;
+  const auto is_furniture = [&](const WallLine& side) {
+    return side.low && std::none_of(all.begin(), all.end(), [&](const WallLine& other) {
+             return other.low && are_faces(side, other);
+           });
+  };
+  walls.erase(std::remove_if(walls.begin(), walls.end(), is_furniture), walls.end());
+}
 
 void drop_furniture(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, bool rays_known) {
   constexpr double kLongest_m = 3.0;  // longest furniture
   constexpr double kLeastHigh = 0.2;  // share of a side that must be higher than furniture
+  const std::vector<WallLine> all = walls;
   keep_sides(walls, rasters, [&](std::size_t i) {
-    const bool high = walls[i].high >= kLeastHigh;
+    const bool high = walls[i].high >= kLeastHigh || walls[i].low ||
+                      std::any_of(all.begin(), all.end(), [&](const WallLine& other) {
+                        return other.high < kLeastHigh && are_faces(all[i], other);
+                      });
     if (!high && (!rays_known || is_looked_over(walls[i], rasters[i]))) return false;
     return walls[i].length() >= kLongest_m || !stands_before_wall(walls[i], walls);
   });

@@ -15,34 +15,35 @@ WallRaster::WallRaster(const Eigen::Vector2d& normal, double offset_m, double fi
       floor_m_(floor_m),
       columns_(std::max(1, static_cast<int>(std::ceil((last_s - first_s) / kWidth_m)) + 1)),
       surface_(static_cast<std::size_t>(columns_) * kRows, 0),
-      rays_(surface_.size(), 0) {}
+      rays_(surface_.size(), 0),
+      hidden_(surface_.size(), 0) {}
 
 int WallRaster::column_of(double s) const {
   return std::clamp(static_cast<int>(std::floor((s - first_s_) / kWidth_m)), 0, columns_ - 1);
 }
 
-void WallRaster::add_surface(const Eigen::Vector3d& place) {
+void WallRaster::mark(const Eigen::Vector3d& place, std::vector<std::uint8_t>& cells) const {
   const double s = along_.dot(place.head<2>());
   const int row = static_cast<int>(std::floor((place.z() - floor_m_) / kHeight_m));
   const int column = static_cast<int>(std::floor((s - first_s_) / kWidth_m));
   if (row < 0 || row >= kRows || column < 0 || column >= columns_) return;
-  surface_[static_cast<std::size_t>(column) * kRows + static_cast<std::size_t>(row)] = 1;
+  cells[static_cast<std::size_t>(column) * kRows + static_cast<std::size_t>(row)] = 1;
 }
+
+void WallRaster::add_surface(const Eigen::Vector3d& place) { mark(place, surface_); }
 
 void WallRaster::add_rays(const ViewRays& rays) {
   constexpr double kBehind_m = 0.08;  // further than noise
+  constexpr double kBefore_m = 0.04;  // flat things on a wall are in front of it, and noise is not surface
   const double origin = normal_.dot(rays.origin.head<2>()) - offset_m_;
   for (const Eigen::Vector3f& end_f : rays.ends) {
     const Eigen::Vector3d end = end_f.cast<double>();
     const double reached = normal_.dot(end.head<2>()) - offset_m_;
     const bool through =
         (origin > kBehind_m && reached < -kBehind_m) || (origin < -kBehind_m && reached > kBehind_m);
-    if (!through) continue;
-    const Eigen::Vector3d at = rays.origin + origin / (origin - reached) * (end - rays.origin);
-    const int row = static_cast<int>(std::floor((at.z() - floor_m_) / kHeight_m));
-    const int column = static_cast<int>(std::floor((along_.dot(at.head<2>()) - first_s_) / kWidth_m));
-    if (row < 0 || row >= kRows || column < 0 || column >= columns_) continue;
-    rays_[static_cast<std::size_t>(column) * kRows + static_cast<std::size_t>(row)] = 1;
+    const bool before = reached > kBefore_m && origin > reached + kBefore_m;
+    if (!through && !before) continue;
+    mark(rays.origin + origin / (origin - reached) * (end - rays.origin), through ? rays_ : hidden_);
   }
 }
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A wall from the front: where its surface was seen, and where cameras looked through it.
+// A wall from the front: where its surface was seen, where cameras looked through it, and where something in
+// front hid it from them.
 #include <cstdint>
 #include <vector>
 
@@ -33,10 +34,15 @@ class WallRaster {
   [[nodiscard]] double crossed(int column, double low_m, double high_m) const {
     return share(rays_, column, low_m, high_m);
   }
+  /// Share of the cells that lie behind what rays from the front ended at.
+  [[nodiscard]] double hidden(int column, double low_m, double high_m) const {
+    return share(hidden_, column, low_m, high_m);
+  }
   /// Height over the floor of the highest surface in a column; 0: none.
   [[nodiscard]] double top(int column) const;
 
  private:
+  void mark(const Eigen::Vector3d& place, std::vector<std::uint8_t>& cells) const;
   [[nodiscard]] double share(const std::vector<std::uint8_t>& cells, int column, double low_m,
                              double high_m) const;
   Eigen::Vector2d normal_;
@@ -47,6 +53,7 @@ class WallRaster {
   int columns_;
   std::vector<std::uint8_t> surface_;  ///< by column, then row
   std::vector<std::uint8_t> rays_;
+  std::vector<std::uint8_t> hidden_;
 };
 
 }  // namespace plumbline::exports

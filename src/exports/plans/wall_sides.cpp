@@ -172,6 +172,25 @@ bool is_tall(const WallRaster& raster, const std::pair<int, int>& run, double ne
          look.at_cut > kLeastAtCut;
 }
 
+/// True if a run may be one face of a wall that is no higher than furniture: seen from its foot to the cut.
+bool is_low_wall(const WallRaster& raster, const std::pair<int, int>& run, double cut_m) {
+  constexpr double kFoot_m = 0.1;
+  constexpr double kShortest_m = 0.8;
+  constexpr double kLeastSeen = 0.6;
+  if ((run.second - run.first + 1) * WallRaster::kWidth_m < kShortest_m || cut_m <= kFoot_m) return false;
+
+  int columns = 0, reaching = 0;
+  double seen = 0.0;
+  for (int c = run.first; c <= run.second; ++c) {
+    const double top = raster.top(c);
+    if (top == 0.0) continue;  // narrower than the cloud's spacing
+    ++columns;
+    seen += raster.seen(c, kFoot_m, cut_m);
+    if (top > cut_m) ++reaching;
+  }
+  return seen >= kLeastSeen * columns && reaching >= kLeastSeen * columns;
+}
+
 /// Points of the slab around a line that face as it does.
 std::vector<Eigen::Vector3d> points_on(const evaluate::SurfaceSamples& samples, const WallLine& line) {
   const Eigen::Vector3f facing(static_cast<float>(line.normal.x()), static_cast<float>(line.normal.y()),
@@ -226,9 +245,11 @@ std::vector<Side> sides_on(const evaluate::SurfaceSamples& samples, const evalua
 
   std::vector<Side> sides;
   for (const auto& run : filled_runs(raster)) {
-    if (!is_tall(raster, run, need_m, cut_m)) continue;
+    const bool tall = is_tall(raster, run, need_m, cut_m);
+    if (!tall && !is_low_wall(raster, run, cut_m)) continue;
     Side side;
     side.line = base;
+    side.line.low = !tall;
 
     std::vector<Eigen::Vector2d> places;
     for (const Eigen::Vector3d& p : own) {
@@ -277,8 +298,10 @@ void fit_sides(const cloud::Cloud& cloud, double floor_m, const core::Executor& 
 
     const WallLine before = wall;
     fit_line(places, wall);
-    for (WallOpening& opening : wall.openings)
-      opening = {wall.along().dot(before.at(opening.s0)), wall.along().dot(before.at(opening.s1))};
+    for (auto* parts : {&wall.openings, &wall.gaps}) {
+      for (WallOpening& part : *parts)
+        part = {wall.along().dot(before.at(part.s0)), wall.along().dot(before.at(part.s1))};
+    }
   });
 }
 
@@ -301,8 +324,9 @@ std::vector<WallLine> wall_sides(const cloud::Cloud& cloud, double floor_m, doub
 
   std::vector<Side> sides;
   for (const auto& of_plane : found) sides.insert(sides.end(), of_plane.begin(), of_plane.end());
-  std::stable_sort(sides.begin(), sides.end(),
-                   [](const Side& a, const Side& b) { return a.points > b.points; });
+  std::stable_sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+    return a.line.low != b.line.low ? b.line.low : a.points > b.points;
+  });
 
   std::vector<WallLine> walls;
   for (const Side& side : sides) {

@@ -13,6 +13,8 @@ namespace plumbline::exports {
 /// Drops tall sides that are not walls: cameras looked over them, or they stand in front of a wall. Without
 /// rays only what reaches high is known to be a wall.
 void drop_furniture(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, bool rays_known);
+/// Drops low sides that are not one of the two faces of a thin wall, such as the fronts of furniture.
+void drop_low_furniture(std::vector<WallLine>& walls);
 /// Drops door leaves and parts of furniture: short sides that neither meet walls at both ends, or one at a
 /// right angle, nor continue along a line.
 void drop_loose_sides(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters);
@@ -26,16 +28,27 @@ struct Fronts {
   std::shared_ptr<const WallRaster> first, last;
 };
 
+constexpr double kHighest_m = 3.0;  ///< of what is looked at of a wall, over the floor
 constexpr double kNarrowestDoor_m = 0.55;
 constexpr double kWidestDoor_m = 1.6;
 constexpr double kThickestWall_m = 0.45;
 
-/// Heights between which a column must be free to count as open, metres.
+/// The height of the cut over the floor, metres, and the heights between which a column must be free to be
+/// part of a door.
 struct Cut {
+  double at_m;
   double low_m;
   double high_m;
   bool rays_known;
 };
+
+/// Drops sides that the cut passes over or below, and finds the gaps of the others.
+void cut_sides(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, const Cut& cut);
+/// Parts between two places of a side where the cut meets no wall: cameras looked through, or surface was
+/// seen above and below and nothing in front hid the part, as at a window whose pane reflects nothing.
+std::vector<WallOpening> gaps_between(const WallRaster& raster, double s0, double s1, const Cut& cut);
+/// Drops gaps that are doors.
+void drop_gaps_at_doors(WallLine& wall);
 
 /// Openings between two places of a side.
 std::vector<WallOpening> openings_between(const WallRaster& raster, double s0, double s1, const Cut& cut);

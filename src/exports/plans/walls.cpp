@@ -61,7 +61,9 @@ void move_plan(const Eigen::Vector2d& shift, WallPlan& plan) {
     wall.offset_m += wall.normal.dot(shift);
     wall.s0 += along_m;
     wall.s1 += along_m;
-    for (WallOpening& opening : wall.openings) opening = {opening.s0 + along_m, opening.s1 + along_m};
+    for (auto* parts : {&wall.openings, &wall.gaps}) {
+      for (WallOpening& part : *parts) part = {part.s0 + along_m, part.s1 + along_m};
+    }
   }
   for (WallDoor& door : plan.doors) {
     for (Eigen::Vector2d& jamb : door.jambs) jamb += shift;
@@ -92,6 +94,7 @@ core::Result<WallPlan> find_walls(MapSource& source) {
   const cloud::Cloud& points = *(*cloud)->cloud;
   WallPlan plan;
   plan.walls = wall_sides(points, floor_m, cut_m, source.executor());
+  drop_low_furniture(plan.walls);
   std::vector<WallRaster> rasters = rasters_of(plan.walls, points, floor_m);
   if (source.has_store()) {
     auto seen = for_each_view(source, [&](const ViewRays& rays) -> core::Result<void> {
@@ -104,10 +107,13 @@ core::Result<WallPlan> find_walls(MapSource& source) {
 
   drop_furniture(plan.walls, rasters, plan.rays_known);
   drop_loose_sides(plan.walls, rasters);
+  constexpr double kLintel_m = 2.0;
+  const Cut cut{cut_m, std::max(0.25, cut_m - 0.3),
+                std::clamp(cut_m + 0.3, 0.0, std::max(kLintel_m, cut_m + 0.1)), plan.rays_known};
+  cut_sides(plan.walls, rasters, cut);
   if (plan.walls.empty()) return tl::unexpected(no_wall_error(source, **cloud));
 
   join_corners(plan.walls);
-  const Cut cut{std::max(0.25, cut_m - 0.3), cut_m + 0.3, plan.rays_known};
   for (std::size_t i = 0; i < plan.walls.size(); ++i)
     plan.walls[i].openings = openings_between(rasters[i], plan.walls[i].s0, plan.walls[i].s1, cut);
 
@@ -122,8 +128,11 @@ core::Result<WallPlan> find_walls(MapSource& source) {
   meet_hidden_walls(plan.walls);
 
   for (WallLine& wall : plan.walls) {
-    std::sort(wall.openings.begin(), wall.openings.end(),
-              [](const WallOpening& a, const WallOpening& b) { return a.s0 < b.s0; });
+    drop_gaps_at_doors(wall);
+    for (auto* parts : {&wall.openings, &wall.gaps}) {
+      std::sort(parts->begin(), parts->end(),
+                [](const WallOpening& a, const WallOpening& b) { return a.s0 < b.s0; });
+    }
   }
 
   plan.doors = doors_of(plan.walls);

@@ -10,7 +10,7 @@
 
 namespace plumbline::exports {
 
-/// A way through a wall, from s0 to s1 along its line, metres.
+/// A part of a wall, from s0 to s1 along its line, metres.
 struct WallOpening {
   double s0 = 0.0;
   double s1 = 0.0;
@@ -24,7 +24,9 @@ struct WallLine {
   double s1 = 0.0;
   double top_m = 0.0;                   ///< height over the floor up to which it was seen
   double high = 0.0;                    ///< share of its length that was seen up to where furniture ends
-  std::vector<WallOpening> openings;    ///< in order, apart
+  bool low = false;                     ///< it ends below the height of furniture
+  std::vector<WallOpening> openings;    ///< doors, in order, apart
+  std::vector<WallOpening> gaps;        ///< parts that the cut passes through or over: windows, lower parts
   std::array<int, 2> corner{-1, -1};    ///< the line that its first and its last end meet; -1: none
   std::array<int, 2> corner_end{0, 0};  ///< end of that line: 0 first, 1 last, 2 somewhere along it
 

@@ -27,6 +27,14 @@ def turned(points, yaw, shift):
     return np.asarray(points) @ np.array([[c, s], [-s, c]]) + shift
 
 
+def scene_from_map(start_file, path_file):
+    """Turn and shift, seen from above, of the map's frame in the scene's."""
+    start = json.load(open(start_file))["robots"][0]["start"]
+    first = [float(v) for v in next(line for line in open(path_file) if line[0] != "#").split()]
+    yaw = yaw_of(start["quaternion_xyzw"]) - yaw_of(first[4:8])
+    return yaw, np.array(start["position_m"][:2]) - turned([first[1:3]], yaw, 0)[0]
+
+
 def truth_of(scene):
     """Sides of walls as (start, end), doors that stand open as (middle, width), corners."""
     sides, doors = [], []
@@ -131,10 +139,7 @@ def fitted(lines, sides, yaw, shift):
 def main():
     plan, scene_file, start_file, path_file = sys.argv[1:5]
     scene = yaml.safe_load(open(scene_file))
-    start = json.load(open(start_file))["robots"][0]["start"]
-    first = [float(v) for v in next(line for line in open(path_file) if line[0] != "#").split()]
-    yaw = yaw_of(start["quaternion_xyzw"]) - yaw_of(first[4:8])
-    shift = np.array(start["position_m"][:2]) - turned([first[1:3]], yaw, 0)[0]
+    yaw, shift = scene_from_map(start_file, path_file)
 
     space = ezdxf.readfile(plan).modelspace()
     ends = lambda layer: [np.array([list(e.dxf.start)[:2], list(e.dxf.end)[:2]])
@@ -145,7 +150,7 @@ def main():
     sides, doors = truth_of(scene)
     yaw, shift = fitted(long, sides, yaw, shift)
 
-    lines = whole_lines(long, [door.mean(axis=0) for door in drawn_doors])
+    lines = whole_lines(long, [door.mean(axis=0) for door in [*drawn_doors, *ends("windows")]])
     corners = corners_of(sides)
     offs, lengths, strange, table = [], [], [], []
     for line in lines:
@@ -194,4 +199,5 @@ def main():
         sys.exit("; ".join(wrong))
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -421,14 +421,15 @@ def need_ezdxf():
 
 
 def case_truth(case):
-    """The plan of the generated office against its scene file: walls, their lengths, doors."""
+    """Plan and grid of the generated office against its scene file: walls, their lengths, doors; what is free."""
     need_ezdxf()
     start = case.work / "start"  # where the camera began, in the scene's frame
     shutil.rmtree(start, ignore_errors=True)
     run(case.program, "synth", "office", "-o", start, "--frames", 2, "--width", 64, "--height", 48,
         "--fps", OFFICE["fps"], "--seed", OFFICE["seed"], "--reference-spacing", "0.5", "-q")
-    print(run(SYSTEM_PYTHON, HERE / "judge_plan.py", case.export("truth.dxf"), SCENES / "office.yaml",
-              start / "scene.json", case.map / "trajectory.txt").strip())
+    for judge, file in (("judge_plan.py", "truth.dxf"), ("judge_grid.py", "truth.yaml")):
+        print(run(SYSTEM_PYTHON, HERE / judge, case.export(file), SCENES / "office.yaml", start / "scene.json",
+                  case.map / "trajectory.txt").strip())
 
 
 def case_clouds(case):

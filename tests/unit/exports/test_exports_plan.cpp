@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <regex>
 #include <set>
+#include <vector>
 
 #include "exports/export_test.hpp"
 
@@ -51,6 +54,16 @@ class ExportPlan : public ExportTest {
     std::multiset<std::string> found;
     const std::regex text("AcDbText\n 10\n[^A]*?\n  1\n([^\n]*)\n");
     for (std::sregex_iterator it(dxf.begin(), dxf.end(), text), end; it != end; ++it) found.insert((*it)[1]);
+    return found;
+  }
+  /// Ends of the lines of a layer of plan.dxf: x y x y.
+  [[nodiscard]] std::vector<std::array<double, 4>> lines(const std::string& layer) const {
+    const std::string dxf = bytes("plan.dxf");
+    const std::regex line("  8\n" + layer +
+                          "\n100\nAcDbLine\n 10\n(.*)\n 20\n(.*)\n 30\n.*\n 11\n(.*)\n 21\n(.*)\n");
+    std::vector<std::array<double, 4>> found;
+    for (std::sregex_iterator it(dxf.begin(), dxf.end(), line), end; it != end; ++it)
+      found.push_back({std::stod((*it)[1]), std::stod((*it)[2]), std::stod((*it)[3]), std::stod((*it)[4])});
     return found;
   }
   static std::size_t count(const std::string& text, const std::string& what) {
@@ -104,6 +117,46 @@ TEST_F(ExportPlan, ACutAboveTheDoorMeetsItsLintel) {
   const auto summary = write(wanted);
   ASSERT_TRUE(summary) << summary.error().message;
   EXPECT_EQ(summary->notes.front(), "8 walls, 0 doors, 2 closed rooms");
+}
+
+TEST_F(ExportPlan, WindowsAndHalfHeightWallsAreCutAtTheCut) {
+  constexpr float kSill_m = 0.9F;
+  constexpr float kHead_m = 2.2F;
+  cloud::Cloud with_window;
+  for (const cloud::Point& p : cloud_) {
+    const bool pane = p.y == 3.0F && p.x > 1.0F && p.x < 2.5F && p.z > kSill_m && p.z < kHead_m;
+    if (!pane) with_window.push_back(p);
+  }
+  cloud_ = with_window;
+  add_wall({1.0F, 1.7F}, {3.0F, 1.7F}, 0, 1.1F);
+  add_wall({3.0F, 1.6F}, {1.0F, 1.6F}, 0, 1.1F);
+  ASSERT_TRUE(cloud::write_ply(path("cloud.ply"), cloud_));
+
+  const auto note_at = [&](double cut_m) {
+    ExportRequest wanted = request("plan.dxf");
+    wanted.options.cut_m = cut_m;
+    wanted.given = {"cut"};
+    const auto summary = write(wanted);
+    EXPECT_TRUE(summary) << summary.error().message;
+    return summary ? summary->notes.front() : "";
+  };
+  EXPECT_EQ(note_at(0.6), "10 walls, 1 doors, 2 closed rooms");
+  EXPECT_EQ(lines("windows").size(), 0U);
+
+  for (const double cut_m : {1.2, 1.9}) {
+    EXPECT_EQ(note_at(cut_m), "8 walls, 1 doors, 1 windows or gaps at the cut, 2 closed rooms");
+    const std::vector<std::array<double, 4>> windows = lines("windows");
+    ASSERT_EQ(windows.size(), 1U);
+    EXPECT_NEAR(std::max(windows[0][0], windows[0][2]), 2.5, 0.03);
+    EXPECT_NEAR(std::min(windows[0][0], windows[0][2]), 1.0, 0.03);
+    EXPECT_NEAR(windows[0][1], 3.0, 0.005);
+    for (const auto& [x0, y0, x1, y1] : lines("walls")) {
+      const bool across = std::abs(y0 - 3.0) < 0.01 && std::abs(y1 - 3.0) < 0.01 && std::min(x0, x1) < 1.7 &&
+                          std::max(x0, x1) > 1.8;
+      EXPECT_FALSE(across) << "a wall is drawn across the window";
+    }
+  }
+  EXPECT_EQ(note_at(2.35), "8 walls, 0 doors, 2 closed rooms");
 }
 
 TEST_F(ExportPlan, SameCloudSameBytes) {
