@@ -2,9 +2,11 @@
 #include "plumbline/mapping/slam.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <opencv2/core.hpp>
 #include <utility>
 
+#include "plumbline/core/numbers.hpp"
 #include "plumbline/features/measurement.hpp"
 #include "plumbline/mapping/loop_closing/relocalisation_check.hpp"
 #include "plumbline/maps/components.hpp"
@@ -41,12 +43,30 @@ static bool can_start_map(const sensor::RgbdFrame& frame) {
          cv::countNonZero(frame.depth > 0) > kMinMeasured * static_cast<double>(frame.depth.total());
 }
 
+/// Median accuracy of the poses so far, metres: it depends on the measurements that a pipeline uses. Zero:
+/// not known.
+static double usual_sigma_m(const std::vector<maps::FramePose>& frames) {
+  constexpr double kGap = 0.1;  // TrackResult::sigma_m after a gap
+  std::vector<double> sigmas;
+  for (const maps::FramePose& frame : frames) {
+    if (frame.tracked && frame.step_sigma_m > 0.0 && frame.step_sigma_m < kGap)
+      sigmas.push_back(frame.step_sigma_m);
+  }
+  return core::quantile(std::move(sigmas), 0.5, 0.0);
+}
+
 /// True if the pose is accurate enough. In a turn that is too fast it is known to centimetres only: such a
 /// frame is as good as lost. If only the motion model constrains a direction, no better pose can be had.
-static bool is_accurate(const tracking::TrackResult& track) {
-  constexpr double kLeast = 1e4;  // a standard deviation of 1 cm in the weakest direction
+/// Where a pipeline uses few of the measurements, centimetres are usual.
+static bool is_accurate(const tracking::TrackResult& track, const std::vector<maps::FramePose>& before) {
+  constexpr double kEnough_m = 0.01;  // in the weakest direction
+  constexpr double kUsual = 10.0;     // times what is usual
   const bool is_first = track.min_eigenvalue == 0.0;
-  return is_first || track.degenerate_directions > 0 || track.min_eigenvalue >= kLeast;
+  if (is_first || track.degenerate_directions > 0) return true;
+  const double sigma_m = 1.0 / std::sqrt(track.min_eigenvalue);
+  if (sigma_m <= kEnough_m) return true;
+  const double usual_m = usual_sigma_m(before);
+  return usual_m == 0.0 || sigma_m <= kUsual * usual_m;
 }
 
 /// True if a frame may begin a component: it must show enough to track the next ones, so not the dark, a hand
@@ -143,7 +163,8 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& featur
   last_track_ = tracker_.track(map_, frame, features);
   const bool believed = believes_place(frame, features, lost_before);
   const bool tracked = last_track_.state == tracking::TrackState::kTracked;
-  if (!believed || (tracked && !is_accurate(last_track_))) last_track_.state = tracking::TrackState::kLost;
+  if (!believed || (tracked && !is_accurate(last_track_, frame_poses())))
+    last_track_.state = tracking::TrackState::kLost;
   const tracking::TrackResult& track = last_track_;
 
   if (tracker_.astray()) {
