@@ -5,12 +5,15 @@
 // (bundle_normal.cpp), elimination of landmarks (bundle_schur.cpp), steps (bundle_solver.cpp).
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "bundle_solver.hpp"
 #include "bundle_terms.hpp"
 #include "landmark_family.hpp"
+#include "plumbline/optimize/pose_covariances.hpp"
 #include "plumbline/optimize/pose_terms.hpp"
+#include "sparse_blocks.hpp"
 
 namespace plumbline::optimize {
 
@@ -83,7 +86,8 @@ struct NormalEquations {
   [[nodiscard]] double largest_gradient() const;
 };
 
-/// Normal equations of the poses after the landmarks are eliminated.
+/// Normal equations of the poses after the landmarks are eliminated. More than kMostDense poses are stored as
+/// sparse blocks.
 class SchurComplement {
  public:
   explicit SchurComplement(int free_poses);
@@ -94,18 +98,32 @@ class SchurComplement {
     return pose_steps_.segment<6>(static_cast<Eigen::Index>(6 * slot));
   }
   [[nodiscard]] double squared_pose_steps() const { return pose_steps_.squaredNorm(); }
-  /// Diagonal blocks of the inverse, without damping: the covariances of free poses. Empty: singular.
-  std::vector<geometry::Matrix6d> inverse_blocks(NormalEquations& equations);
+  /// Diagonal blocks of the inverse, with the damping of the poses only, at radius 1: the covariances of free
+  /// poses. Empty: singular. `least_share`: of LandmarkFamily::invert_held; 0: landmarks are inverted as they
+  /// are.
+  std::vector<geometry::Matrix6d> inverse_blocks(NormalEquations& equations, double least_share);
+  /// True if inverse_blocks() keeps within `most` numbers.
+  [[nodiscard]] bool fits(NormalEquations& equations, std::size_t most);
 
  private:
+  static constexpr int kMostDense = 600;
   template <typename Family>
   void eliminate(const Family& family, std::size_t slot);
   void assemble(NormalEquations& equations, double radius);
-  [[nodiscard]] double* block(int row, int column) { return &matrix_(6 * row, 6 * column); }
+  [[nodiscard]] double* block(int row, int column) {
+    return sparse_ ? sparse_->block(row, column) : &matrix_(6 * row, 6 * column);
+  }
+  /// Distance between the columns of a block.
+  [[nodiscard]] std::ptrdiff_t stride() const { return sparse_ ? 6 : matrix_.rows(); }
+  using Entries = Eigen::Map<geometry::Matrix6d, 0, Eigen::OuterStride<>>;
+  [[nodiscard]] Entries entries(int row, int column) {
+    return Entries(block(row, column), Eigen::OuterStride<>(stride()));
+  }
 
   int free_;
   Eigen::VectorXd pose_steps_;  ///< 6 a free slot
-  Eigen::MatrixXd matrix_;      ///< its lower triangle
+  Eigen::MatrixXd matrix_;      ///< its lower triangle; empty: in sparse_
+  std::optional<SparseBlocks> sparse_;
   std::vector<Target> targets_;
 };
 
@@ -117,7 +135,7 @@ class BundleRound {
   /// Holds poses that have edges at their present positions as well (holding_edges).
   void hold(const BundleState& state);
   RoundSummary run(BundleState& state);
-  [[nodiscard]] std::vector<geometry::Matrix6d> covariances(const BundleState& state);
+  [[nodiscard]] PoseCovariances covariances(const BundleState& state);
 
  private:
   void add_observations();
@@ -129,6 +147,8 @@ class BundleRound {
   void step(const BundleState& from, BundleState& to) const;
   [[nodiscard]] bool tiny_step(const BundleState& state) const;
   const char* iterate(TrustRegion& region, BundleState& state, BundleState& next, RoundSummary& summary);
+  [[nodiscard]] std::vector<geometry::Matrix6d> held_by_prior(double information);
+  [[nodiscard]] std::vector<geometry::Matrix6d> repaired();
 
   const BundleProblem& problem_;
   const BundleOptions& options_;

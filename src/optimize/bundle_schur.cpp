@@ -9,6 +9,8 @@ namespace {
 
 using geometry::Matrix6d;
 
+constexpr double kNoRadius = std::numeric_limits<double>::infinity();
+
 /// y w^T is subtracted from each target, a 6x6 block of a matrix whose columns are `stride` long; y and w are
 /// 6 x unknowns.
 PLUMBLINE_CLONES
@@ -46,25 +48,31 @@ void SchurComplement::eliminate(const Family& family, std::size_t slot) {
       if (column > row) break;
       targets_.push_back({block(row, column), family.cross[other].data()});
     }
-    subtract_products(y.data(), static_cast<int>(Family::Vector::RowsAtCompileTime), targets_,
-                      matrix_.rows());
+    subtract_products(y.data(), static_cast<int>(Family::Vector::RowsAtCompileTime), targets_, stride());
   }
 }
 
-SchurComplement::SchurComplement(int free_poses)
-    : free_(free_poses), pose_steps_(6 * free_poses), matrix_(6 * free_poses, 6 * free_poses) {}
+SchurComplement::SchurComplement(int free_poses) : free_(free_poses), pose_steps_(6 * free_poses) {
+  if (free_poses > kMostDense) {
+    sparse_.emplace(free_poses);
+  } else {
+    matrix_.resize(6 * free_poses, 6 * free_poses);
+  }
+}
 
-/// The right side is stored in the place of the steps.
+/// Landmarks must be inverted. The right side is stored in the place of the steps.
 void SchurComplement::assemble(NormalEquations& equations, double radius) {
-  equations.points.invert(radius);
-  equations.lines.invert(radius);
-  matrix_.setZero();
+  if (sparse_) {
+    sparse_->clear();
+  } else {
+    matrix_.setZero();
+  }
 
   for (std::size_t slot = 0; slot < at(free_); ++slot) {
-    const auto begin = static_cast<Eigen::Index>(6 * slot);
-    matrix_.block<6, 6>(begin, begin) = equations.hessian[slot];
-    matrix_.diagonal().segment<6>(begin) += equations.damping[slot].diagonal / radius;
-    pose_steps_.segment<6>(begin) = -equations.gradient[slot];
+    auto own = entries(static_cast<int>(slot), static_cast<int>(slot));
+    own = equations.hessian[slot];
+    own.diagonal() += equations.damping[slot].diagonal / radius;
+    pose_steps_.segment<6>(static_cast<Eigen::Index>(6 * slot)) = -equations.gradient[slot];
     eliminate(equations.points, slot);
     eliminate(equations.lines, slot);
   }
@@ -73,29 +81,49 @@ void SchurComplement::assemble(NormalEquations& equations, double radius) {
     if (edge.a < 0 || edge.a >= free_ || edge.b >= free_ || edge.a == edge.b) continue;
     const Matrix6d cross = edge.j.by_a.transpose() * edge.j.by_b;
     if (edge.a > edge.b) {
-      matrix_.block<6, 6>(6 * edge.a, 6 * edge.b) += cross;
+      entries(edge.a, edge.b) += cross;
     } else {
-      matrix_.block<6, 6>(6 * edge.b, 6 * edge.a) += cross.transpose();
+      entries(edge.b, edge.a) += cross.transpose();
     }
   }
 }
 
 bool SchurComplement::solve(NormalEquations& equations, double radius) {
+  equations.points.invert(radius);
+  equations.lines.invert(radius);
   assemble(equations, radius);
-  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(matrix_);
-  if (llt.info() != Eigen::Success) return false;
-  llt.solveInPlace(pose_steps_);
+  if (sparse_) {
+    if (!sparse_->solve(pose_steps_)) return false;
+  } else {
+    const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(matrix_);
+    if (llt.info() != Eigen::Success) return false;
+    llt.solveInPlace(pose_steps_);
+  }
   if (!pose_steps_.allFinite()) return false;
   equations.points.substitute_back(pose_steps_);
   equations.lines.substitute_back(pose_steps_);
   return true;
 }
 
+bool SchurComplement::fits(NormalEquations& equations, std::size_t most) {
+  if (!sparse_) return true;
+  assemble(equations, kNoRadius);
+  return sparse_->factor_numbers() <= most;
+}
+
 /// With S = L L^T they are X^T X, L X = the pose's columns of the identity, of which only rows from the pose
 /// on are not zero. Several poses are solved at a time, as each needs all of L.
-std::vector<Matrix6d> SchurComplement::inverse_blocks(NormalEquations& equations) {
+std::vector<Matrix6d> SchurComplement::inverse_blocks(NormalEquations& equations, double least_share) {
   constexpr int kAtATime = 16;
-  assemble(equations, std::numeric_limits<double>::infinity());
+  if (least_share > 0.0) {
+    equations.points.invert_held(least_share);
+    equations.lines.invert_held(least_share);
+  } else {
+    equations.points.invert(kNoRadius);
+    equations.lines.invert(kNoRadius);
+  }
+  assemble(equations, 1.0);
+  if (sparse_) return sparse_->inverse_blocks();
   const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(matrix_);
   if (llt.info() != Eigen::Success) return {};
   std::vector<Matrix6d> result(at(free_));

@@ -4,7 +4,6 @@
 #include <limits>
 
 #include "bundle_round.hpp"
-#include "plumbline/optimize/pose_covariances.hpp"
 
 namespace plumbline::optimize {
 
@@ -72,16 +71,6 @@ bool BundleRound::tiny_step(const BundleState& state) const {
   return std::sqrt(moved) <= kShare * (std::sqrt(size) + kShare);
 }
 
-std::vector<Matrix6d> BundleRound::covariances(const BundleState& state) {
-  linearise(state);
-  const std::vector<Matrix6d> blocks = reduced_.inverse_blocks(equations_);
-  std::vector<Matrix6d> result;
-  if (blocks.empty() && slots_.free > 0) return result;
-  result.resize(state.poses.size(), Matrix6d::Zero());
-  for (std::size_t slot = 0; slot < blocks.size(); ++slot) result[at(slots_.pose[slot])] = blocks[slot];
-  return result;
-}
-
 /// Makes one step; returns the reason if it was the last one, else null.
 const char* BundleRound::iterate(TrustRegion& region, BundleState& state, BundleState& next,
                                  RoundSummary& summary) {
@@ -143,10 +132,6 @@ RoundSummary solve_bundle_round(const BundleProblem& problem, const BundleOption
   BundleRound round(problem, options);
   round.hold(state);
   return round.run(state);
-}
-
-std::vector<Matrix6d> pose_covariances(const BundleProblem& problem, const BundleOptions& options) {
-  return BundleRound(problem, options).covariances(state_of(problem));
 }
 
 }  // namespace plumbline::optimize

@@ -6,6 +6,7 @@
 // then fixed ones. Observations are in the order of their poses.
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -109,6 +110,24 @@ struct LandmarkFamily {
         inverse[n] = llt.solve(Square::Identity());
       } else {
         inverse[n] = h.completeOrthogonalDecomposition().pseudoInverse();
+      }
+      step[n].noalias() = inverse[n] * gradient[n];
+    }
+  }
+
+  /// Inverts each landmark's block without damping; along directions with less than this share of the
+  /// information of the best one, in units that make the parameters alike, the inverse is zero.
+  void invert_held(double least_share) {
+    for (std::size_t n = 0; n < hessian.size(); ++n) {
+      const Vector unit =
+          (hessian[n].diagonal().array() > 0.0).select(hessian[n].diagonal().array().sqrt().inverse(), 1.0);
+      const Eigen::SelfAdjointEigenSolver<Square> eigen(unit.asDiagonal() * hessian[n] * unit.asDiagonal());
+      const double least = least_share * eigen.eigenvalues()(kUnknowns - 1);
+      inverse[n].setZero();
+      for (int i = 0; i < kUnknowns; ++i) {
+        if (!(eigen.eigenvalues()(i) > least)) continue;
+        const Vector direction = unit.asDiagonal() * eigen.eigenvectors().col(i);
+        inverse[n] += direction * direction.transpose() / eigen.eigenvalues()(i);
       }
       step[n].noalias() = inverse[n] * gradient[n];
     }

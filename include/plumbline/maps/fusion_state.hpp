@@ -16,7 +16,7 @@ namespace plumbline::maps {
 inline const char* const kFusionAttachment = "fusion";  ///< its name in a store
 
 struct FusionState {
-  /// Covariances of keyframes' poses, by robot and stamp; empty: not known.
+  /// Covariances of keyframes' poses, by robot and stamp; empty, or NaN for one keyframe: not known.
   std::map<std::pair<std::int32_t, double>, geometry::Matrix6d> covariances;
 
   /// Covariances of views: those of keyframes, and in between that of the previous one; empty: not known.

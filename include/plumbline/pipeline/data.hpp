@@ -71,9 +71,9 @@ struct RobotMaps {
 
 /// The finished map without its dense cloud; poses after all optimisation.
 struct MapResult : maps::MapPoses {
-  std::shared_ptr<const maps::Map> map;             ///< null when the poses come from a file
-  std::vector<maps::FramePose> frame_poses;         ///< empty when `map` is null
-  std::vector<mapping::KeyframeAccuracy> accuracy;  ///< of the keyframes; empty: not known
+  std::shared_ptr<const maps::Map> map;      ///< null when the poses come from a file
+  std::vector<maps::FramePose> frame_poses;  ///< empty when `map` is null
+  mapping::MapAccuracy accuracy;
   std::vector<maps::LineSegment3> lines;
   std::vector<RobotInfo> robots;  ///< by number, with the versions of their cameras; empty: one robot
   std::string frame_columns;      ///< header of FrameRow::columns

@@ -106,10 +106,10 @@ core::Result<void> add_paths(const maps::MapPlace& place, bool lines, viz::Scene
 /// Adds one value per point, for the colour mode.
 core::Result<void> add_scalars(const cloud::CloudFile& file, const fs::path& input, viz::ColorMode mode,
                                viz::Scene& scene) {
-  const auto missing = [&](const char* what) {
+  const auto missing = [&](const char* what, const char* why = "") {
     return core::usage_error(
-        fmt::format("--color {}: {} has no {} of its points; choose rgb, height or normal",
-                    viz::color_mode_name(mode), input.string(), what));
+        fmt::format("--color {}: {} has no {} of its points{}; choose rgb, height or normal",
+                    viz::color_mode_name(mode), input.string(), what, why));
   };
 
   if (mode == viz::ColorMode::kConfidence) {
@@ -121,7 +121,8 @@ core::Result<void> add_scalars(const cloud::CloudFile& file, const fs::path& inp
       if (column.name == cloud::kSigmaColumn) scene.scalars = column.values;
     }
 
-    if (scene.scalars.empty()) return missing("sigma");
+    if (scene.scalars.empty())
+      return missing("sigma", " (summary.json of its run says why: refine, sigma_note)");
     scene.scalar_label = "standard deviation (m)";
   } else if (mode == viz::ColorMode::kRobot) {
     if (file.columns.robot.empty()) return missing("robot");

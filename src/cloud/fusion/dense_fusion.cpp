@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <utility>
 
@@ -249,12 +250,14 @@ class Fusion {
   void find_pose_noise(const std::vector<std::vector<ColorCell>>& cells) {
     for (std::size_t v = 0; v < cells.size(); ++v) {
       const geometry::Rigid3 camera_from_world = views_.world_from_camera[v].inverse();
+      const bool known = views_.covariances[v].allFinite();
       for (const ColorCell& seen : cells[v]) {
         const Eigen::Vector3d centre = (unpack_cell(seen.cell).cast<double>().array() + 0.5) * kCell_m;
         Eigen::Matrix<double, 3, 6> by_pose;
         by_pose << Eigen::Matrix3d::Identity(), -geometry::skew(camera_from_world * centre);
         by_pose = camera_from_world.rotation.transpose() * by_pose;
         PoseNoise& noise = pose_noise_[seen.cell];
+        if (!known) continue;
         const float weight = 1.0F + seen.points;
         noise.sum += weight * (by_pose * views_.covariances[v] * by_pose.transpose()).cast<float>();
         noise.weight += weight;
@@ -267,6 +270,7 @@ class Fusion {
     append(points, several_robots(), all);
     if (views_.covariances.empty()) return;
     std::vector<float>& sigmas = all.columns.others.front().values;
+    constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
     // Noise of the point's cell; a point outside all known cells takes that of the point before.
     const PoseNoise* pose = nullptr;
     for (const FusedPoint& fused : points) {
@@ -277,13 +281,13 @@ class Fusion {
       if (pose != nullptr) {
         const Eigen::Vector3f normal = fused.point.getNormalVector3fMap();
         const float sum = normal.allFinite() ? normal.dot(pose->sum * normal) : pose->sum.trace() / 3.0F;
-        variance += std::max(0.0F, sum / pose->weight);
+        variance += pose->weight > 0.0F ? std::max(0.0F, sum / pose->weight) : kUnknown;
       }
       sigmas.push_back(std::sqrt(variance));
     }
   }
 
-  /// Weighted covariance of the world positions of points in a cell, m^2.
+  /// Weighted covariance of the world positions of points in a cell, m^2; weight 0: not known.
   struct PoseNoise {
     Eigen::Matrix3f sum = Eigen::Matrix3f::Zero();
     float weight = 0.0F;

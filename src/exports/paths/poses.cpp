@@ -60,6 +60,7 @@ core::Result<ExportSummary> write_poses(MapSource& source, const std::filesystem
   }
 
   out.write(head + "\n");
+  std::size_t unknown = 0;
   for (std::size_t i = 0; i < poses->size(); ++i) {
     const ExportPose& pose = (*poses)[i];
     const geometry::Rigid3 body = pose.world_from_camera * camera_from_body;
@@ -69,7 +70,8 @@ core::Result<ExportSummary> write_poses(MapSource& source, const std::filesystem
         pose.keyframe.valid() ? std::to_string(pose.keyframe.index) : "", pose.stamp, body.translation.x(),
         body.translation.y(), body.translation.z(), q.x(), q.y(), q.z(), q.w());
 
-    if (covariances.empty()) {
+    if (covariances.empty() || !covariances[i].allFinite()) {
+      ++unknown;
       row += std::string(21, ',');
     } else {
       const geometry::Matrix6d world = in_world(covariances[i], pose.world_from_camera, camera_from_body);
@@ -85,10 +87,15 @@ core::Result<ExportSummary> write_poses(MapSource& source, const std::filesystem
   ExportSummary summary;
   summary.written = {output};
 
+  if (!covariances.empty() && unknown > 0) {
+    summary.notes.push_back(fmt::format(
+        "the covariance of {} of {} poses is not known, so their columns are empty", unknown, poses->size()));
+  }
+
   if (covariances.empty()) {
     summary.notes.emplace_back(
-        "the map holds no covariances, so their columns are empty: it was interrupted, or made without the "
-        "stage refine");
+        "the map holds no covariances, so their columns are empty: it was interrupted, made without the "
+        "stage refine, or summary.json says why (refine, sigma_note)");
   }
 
   return summary;

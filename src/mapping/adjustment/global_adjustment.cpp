@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/mapping/adjustment/global_adjustment.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -219,6 +221,16 @@ void run_bundle(maps::Map& map, const Cameras& cameras, const std::vector<PoseEd
   summary.changed = true;
 }
 
+/// Says how many keyframes nothing relates to the anchor; empty: none.
+std::string unknown_text(const std::vector<KeyframeAccuracy>& keyframes) {
+  const auto is_unknown = [](const KeyframeAccuracy& k) { return !k.covariance.allFinite(); };
+  const auto first = std::find_if(keyframes.begin(), keyframes.end(), is_unknown);
+  if (first == keyframes.end()) return {};
+  return fmt::format(
+      "nothing relates {} of {} keyframes to the first one in all directions, keyframe {} among them",
+      std::count_if(first, keyframes.end(), is_unknown), keyframes.size(), first->keyframe.index);
+}
+
 /// Standard deviations as large as the factors make them.
 void widen(const SigmaFactors& factors, optimize::BundleProblem& problem) {
   for (optimize::BundlePointObservation& o : problem.point_observations) {
@@ -304,32 +316,35 @@ GlobalAdjustmentSummary adjust_map(maps::Map& map, const Cameras& cameras, const
   return summary;
 }
 
-std::vector<KeyframeAccuracy> keyframe_accuracy(const maps::Map& map, const Cameras& cameras,
-                                                const std::vector<PoseEdge>& extra,
-                                                const GlobalAdjustmentOptions& options, KeyframeId anchor) {
-  constexpr std::size_t kMost = 600;
+MapAccuracy keyframe_accuracy(const maps::Map& map, const Cameras& cameras,
+                              const std::vector<PoseEdge>& extra, const GlobalAdjustmentOptions& options,
+                              KeyframeId anchor) {
   const std::vector<KeyframeId> ids = map.keyframe_ids();
-  if (ids.empty() || ids.size() > kMost) return {};
+  if (ids.empty()) return {{}, "the map has no keyframes"};
 
   int unused = 0;
   MapBundle bundle = bundle_of(map, cameras, extra, options, anchor.valid() ? anchor : ids.front(), unused);
   widen(options.sigma_factors, bundle.problem);
-  const std::vector<Matrix6d> covariances =
+  const optimize::PoseCovariances covariances =
       optimize::pose_covariances(bundle.problem, options.bundle_options);
-  if (covariances.empty()) return {};
+  if (covariances.of_pose.empty()) return {{}, covariances.missing};
 
-  std::vector<KeyframeAccuracy> result(ids.size());
+  MapAccuracy result;
+  std::vector<KeyframeAccuracy>& keyframes = result.keyframes;
+  keyframes.resize(ids.size());
   for (std::size_t i = 0; i < ids.size(); ++i) {
-    result[i].keyframe = ids[i];
-    result[i].covariance = covariances[i];
-    result[i].edges = static_cast<int>(
+    keyframes[i].keyframe = ids[i];
+    keyframes[i].covariance = covariances.of_pose[i];
+    keyframes[i].edges = static_cast<int>(
         map.edges_of(ids[i]).size() +
         static_cast<std::size_t>(std::count_if(
             extra.begin(), extra.end(), [&](const PoseEdge& e) { return e.a == ids[i] || e.b == ids[i]; })));
   }
 
-  for (const auto& o : bundle.problem.point_observations) ++result[static_cast<std::size_t>(o.pose)].points;
-  for (const auto& o : bundle.problem.line_observations) ++result[static_cast<std::size_t>(o.pose)].lines;
+  for (const auto& o : bundle.problem.point_observations)
+    ++keyframes[static_cast<std::size_t>(o.pose)].points;
+  for (const auto& o : bundle.problem.line_observations) ++keyframes[static_cast<std::size_t>(o.pose)].lines;
+  result.missing = unknown_text(keyframes);
   return result;
 }
 

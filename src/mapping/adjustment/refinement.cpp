@@ -75,9 +75,15 @@ Refinement refine_map(maps::Map& map, const std::map<core::KeyframeId, CoarseSur
   const GlobalAdjustmentSummary adjusted = adjust_map(map, cameras, edges, options.adjustment);
   count(adjusted, result.summary);
   tell(adjusted, edges.size(), log);
-  if (!options.accuracy) return result;
+  if (!options.accuracy) {
+    result.accuracy.missing = "refine.accuracy is off";
+    return result;
+  }
+
   result.accuracy =
       keyframe_accuracy(map, cameras, believed_edges(edges, adjusted.extra), options.adjustment);
+  if (!result.accuracy.missing.empty())
+    log.warning("refine: standard deviations (sigma) are not known: " + result.accuracy.missing);
   return result;
 }
 

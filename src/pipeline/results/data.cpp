@@ -33,7 +33,7 @@ geometry::Trajectory trajectory_of(const MapResult& map, std::int32_t robot) {
 
 void take_poses_from_map(MapResult& result) {
   static_cast<maps::MapPoses&>(result) = maps::poses_of(*result.map, result.frame_poses);
-  result.accuracy.clear();
+  result.accuracy = {};
   result.lines = maps::line_segments(*result.map);
 }
 

@@ -86,7 +86,7 @@ class FuseStage : public Stage {
     cloud["points"] = report_.points;
     cloud["voxel_m"] = options_.voxels.voxel_m;
     report_left_out_of_map(report_.filters, cloud);
-    if (report_.sigma.median > 0.0) cloud["sigma_m"] = section_of(report_.sigma);
+    cloud["sigma_m"] = section_of(report_.sigma);
     summary["frame"] = {{"up", report_.frame.up},
                         {"yaw", report_.frame.yaw},
                         {"output_from_map", rows(report_.frame.output_from_map)}};
@@ -155,9 +155,10 @@ class FuseStage : public Stage {
         views.robots.push_back(static_cast<std::uint8_t>(std::clamp(robot, 0, kMostRobots)));
     }
 
-    for (std::size_t i = 0; i < map.accuracy.size(); ++i) {
+    const std::vector<mapping::KeyframeAccuracy>& accuracy = map.accuracy.keyframes;
+    for (std::size_t i = 0; i < accuracy.size(); ++i) {
       const maps::KeyframePose& keyframe = map.keyframes[i];
-      state_->covariances[{keyframe.id.robot, keyframe.stamp}] = map.accuracy[i].covariance;
+      state_->covariances[{keyframe.id.robot, keyframe.stamp}] = accuracy[i].covariance;
     }
 
     views.covariances = state_->covariances_of(stored.robots, stored.stamps);

@@ -221,6 +221,11 @@ class OutputStage : public Stage {
     return {};
   }
 
+  /// Empty: not known.
+  static std::string sigma_cell(double sigma, int decimals) {
+    return std::isfinite(sigma) ? fmt::format("{:.{}f}", sigma, decimals) : "";
+  }
+
   /// Writes each keyframe's pose, its accuracy relative to the first one, and its numbers of constraints.
   static core::Result<void> write_keyframes(const std::filesystem::path& file, const MapResult& map) {
     std::map<std::int32_t, std::string> names;
@@ -234,9 +239,11 @@ class OutputStage : public Stage {
       out.write(fmt::format("{},{},{:.6f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},",
                             names[keyframe.id.robot], keyframe.id.index, keyframe.stamp, t.x(), t.y(), t.z(),
                             q.x(), q.y(), q.z(), q.w()));
-      const auto* known = map.accuracy.empty() ? nullptr : &map.accuracy[i];
-      out.write(known ? fmt::format("{:.6f},{:.7f},{},{},{}\n", known->sigma_position_m(),
-                                    known->sigma_rotation_rad(), known->points, known->lines, known->edges)
+      const std::vector<mapping::KeyframeAccuracy>& all = map.accuracy.keyframes;
+      const auto* known = all.empty() ? nullptr : &all[i];
+      out.write(known ? fmt::format("{},{},{},{},{}\n", sigma_cell(known->sigma_position_m(), 6),
+                                    sigma_cell(known->sigma_rotation_rad(), 7), known->points, known->lines,
+                                    known->edges)
                       : ",,,,\n");
     }
     return out.commit();

@@ -61,7 +61,7 @@ class RefineStage : public Stage {
 
   void report(Json& summary) const override {
     std::vector<double> position, rotation;
-    for (const mapping::KeyframeAccuracy& keyframe : result_->accuracy) {
+    for (const mapping::KeyframeAccuracy& keyframe : result_->accuracy.keyframes) {
       position.push_back(keyframe.sigma_position_m());
       rotation.push_back(keyframe.sigma_rotation_rad());
     }
@@ -77,6 +77,7 @@ class RefineStage : public Stage {
                          {"max_shift_m", rounded(summary_.max_shift_m)},
                          {"sigma_position_m", section_of(sigma_of(position))},
                          {"sigma_rotation_rad", section_of(sigma_of(rotation))},
+                         {"sigma_note", result_->accuracy.missing},
                          {"before", fits_section(summary_.before)},
                          {"after", fits_section(summary_.after)}};
   }
@@ -85,7 +86,10 @@ class RefineStage : public Stage {
   [[nodiscard]] std::shared_ptr<MapResult> refined(const MapResult& before,
                                                    mapping::RefinementSummary& summary) {
     auto result = std::make_shared<MapResult>(before);
-    if (!options_.adjust || before.map == nullptr || before.map->keyframe_count() < 2) return result;
+    if (before.map == nullptr || before.map->keyframe_count() < 2)
+      result->accuracy.missing = "the map has fewer than two keyframes";
+    if (!options_.adjust) result->accuracy.missing = "refine.adjust is off";
+    if (!result->accuracy.missing.empty()) return result;
 
     std::map<core::KeyframeId, mapping::CoarseSurface> surfaces = corrected_surfaces(before);
     auto map = std::make_shared<maps::Map>(*before.map);

@@ -12,7 +12,7 @@ namespace {
 constexpr double kMostLostPercent = 10.0;
 constexpr double kWorthReporting_percent = 1.0;
 
-const Json kNoSigma = {{"median", 0.0}, {"p90", 0.0}};
+const Json kNoSigma = {{"median", nullptr}, {"p90", nullptr}};
 
 }  // namespace
 
@@ -54,6 +54,7 @@ Json empty_sections() {
             {"max_shift_m", 0.0},
             {"sigma_position_m", kNoSigma},
             {"sigma_rotation_rad", kNoSigma},
+            {"sigma_note", "the run has no stage refine"},
             {"before", Json::object()},
             {"after", Json::object()}}},
           {"path",
@@ -79,7 +80,9 @@ Json rows(const geometry::Rigid3& transform) {
 }
 
 Json section_of(const Sigma& sigma) {
-  const auto rounded_finely = [](double value) { return std::round(value * 1e6) / 1e6; };
+  const auto rounded_finely = [](double value) {
+    return std::isfinite(value) ? Json(std::round(value * 1e6) / 1e6) : Json(nullptr);
+  };
   return {{"median", rounded_finely(sigma.median)}, {"p90", rounded_finely(sigma.p90)}};
 }
 

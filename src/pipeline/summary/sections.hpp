@@ -4,6 +4,7 @@
 // Sections of summary.json. Each stage fills in its own (Stage::report); parts that several stages share are
 // here.
 #include <cstddef>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -25,16 +26,17 @@ double rounded(double value);
 /// The 4 x 4 matrix, row by row.
 Json rows(const geometry::Rigid3& transform);
 
-/// Median and 90th percentile of standard deviations; 0: not known.
+/// Median and 90th percentile of standard deviations; NaN: not known.
 struct Sigma {
-  double median = 0.0;
-  double p90 = 0.0;
+  double median = std::numeric_limits<double>::quiet_NaN();
+  double p90 = std::numeric_limits<double>::quiet_NaN();
 };
+/// Median and 90th percentile of the values that are known.
 template <typename T>
 Sigma sigma_of(const std::vector<T>& values) {
-  return {static_cast<double>(core::quantile(values, 0.5, T(0))),
-          static_cast<double>(core::quantile(values, 0.9, T(0)))};
+  return {static_cast<double>(core::quantile(values, 0.5)), static_cast<double>(core::quantile(values, 0.9))};
 }
+/// null: not known.
 Json section_of(const Sigma& sigma);
 
 /// Adds to a number of a section.

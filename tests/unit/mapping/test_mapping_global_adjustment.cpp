@@ -149,7 +149,7 @@ TEST(AdjustMap, ExactMeasurementsTakeTheDriftOutAndTheAnchorStays) {
 
 TEST(KeyframeAccuracy, FallsWithTheWayAndRisesWithALoop) {
   RingMap world(0.0);
-  const std::vector<KeyframeAccuracy> open = keyframe_accuracy(world.map, kOneCamera, {}, {});
+  const std::vector<KeyframeAccuracy> open = keyframe_accuracy(world.map, kOneCamera, {}, {}).keyframes;
   ASSERT_EQ(open.size(), 40U);
   EXPECT_EQ(open[0].sigma_position_m(), 0.0);
   EXPECT_EQ(open[0].sigma_rotation_rad(), 0.0);
@@ -162,7 +162,7 @@ TEST(KeyframeAccuracy, FallsWithTheWayAndRisesWithALoop) {
   EXPECT_GT(open[5].sigma_rotation_rad(), open[1].sigma_rotation_rad());
   EXPECT_GT(open[20].sigma_rotation_rad(), open[5].sigma_rotation_rad());
   EXPECT_GT(open[39].sigma_rotation_rad(), open[20].sigma_rotation_rad());
-  const auto closed = keyframe_accuracy(world.map, kOneCamera, {world.edge(0, 39)}, {});
+  const auto closed = keyframe_accuracy(world.map, kOneCamera, {world.edge(0, 39)}, {}).keyframes;
   ASSERT_EQ(closed.size(), 40U);
   EXPECT_LT(closed[39].sigma_position_m(), 0.7 * open[39].sigma_position_m());
   EXPECT_EQ(closed[39].edges, 1);
@@ -174,13 +174,38 @@ TEST(KeyframeAccuracy, FactorsWidenIt) {
   at_their_word.sigma_factors = {1.0, 1.0, 1.0};
   GlobalAdjustmentOptions wide;
   wide.sigma_factors = {3.0, 3.0, 3.0};
-  const auto narrow = keyframe_accuracy(world.map, kOneCamera, {}, at_their_word);
-  const auto widened = keyframe_accuracy(world.map, kOneCamera, {}, wide);
+  const auto narrow = keyframe_accuracy(world.map, kOneCamera, {}, at_their_word).keyframes;
+  const auto widened = keyframe_accuracy(world.map, kOneCamera, {}, wide).keyframes;
   ASSERT_EQ(narrow.size(), 12U);
   ASSERT_EQ(widened.size(), 12U);
   for (std::size_t k = 1; k < 12; ++k)
     EXPECT_NEAR(widened[k].sigma_position_m(), 3.0 * narrow[k].sigma_position_m(),
                 1e-3 * narrow[k].sigma_position_m());
+}
+
+/// What the second robot saw is nowhere in the first one's part, and nothing joins the two.
+TEST(KeyframeAccuracy, OfKeyframesThatNothingRelatesToTheFirstIsNotKnown) {
+  RingMap together(0.0, 24);
+  RingMap apart(0.0, 24, 12);
+  for (const PointId id : apart.map.point_ids()) {
+    const std::vector<maps::Observation> seen = apart.map.point(id).observations;
+    const auto second = [](const maps::Observation& o) { return o.keyframe.robot == 1; };
+    if (std::none_of(seen.begin(), seen.end(), second)) continue;
+    for (const maps::Observation& o : seen) {
+      if (!second(o)) apart.map.unobserve(id, o.keyframe);
+    }
+  }
+  const MapAccuracy found = keyframe_accuracy(apart.map, kTwoCameras, {}, {});
+  ASSERT_EQ(found.keyframes.size(), 24U) << found.missing;
+  EXPECT_NE(found.missing.find("12 of 24 keyframes"), std::string::npos) << found.missing;
+  const auto whole = keyframe_accuracy(together.map, kOneCamera, {}, {});
+  EXPECT_EQ(whole.missing, "");
+  for (std::size_t k = 1; k < 12; ++k) {
+    EXPECT_GT(found.keyframes[k].sigma_position_m(), 0.9 * whole.keyframes[k].sigma_position_m()) << k;
+    EXPECT_LT(found.keyframes[k].sigma_position_m(), 3.0 * whole.keyframes[k].sigma_position_m()) << k;
+    EXPECT_TRUE(std::isnan(found.keyframes[12 + k].sigma_position_m())) << k;
+    EXPECT_TRUE(std::isnan(found.keyframes[12 + k].sigma_rotation_rad())) << k;
+  }
 }
 
 TEST(AdjustMap, ALoopBringsTheEndsTogether) {

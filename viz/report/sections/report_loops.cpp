@@ -124,11 +124,15 @@ std::string fit_html(const ReportData& data) {
   return table.rows() == 0 ? "" : "<h3>Fit of the finished map</h3>\n" + table.html();
 }
 
+/// Standard deviation of the keyframes, and why that of some or all is not known.
 std::string sigma_text(const Json& s) {
-  if (!(number_at(s, "/refine/sigma_position_m/median") > 0.0)) return "not known";
-  return filled(s,
-                "{/refine/sigma_position_m/median:1 mm} in the middle, below "
-                "{/refine/sigma_position_m/p90:1 mm} for 90 % of them");
+  const std::string why = text_at(s, "/refine/sigma_note");
+  if (!(number_at(s, "/refine/sigma_position_m/median") > 0.0))
+    return why.empty() ? "not known" : "not known: " + why;
+  const std::string known = filled(s,
+                                   "{/refine/sigma_position_m/median:1 mm} in the middle, below "
+                                   "{/refine/sigma_position_m/p90:1 mm} for 90 % of them");
+  return why.empty() ? known : known + "; not known of all: " + why;
 }
 
 /// Loops that agree with one another against the path.

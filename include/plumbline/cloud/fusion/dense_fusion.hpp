@@ -56,7 +56,7 @@ struct FusionViews {
   std::vector<std::uint8_t> robots;  ///< robot of each view, 0-254; empty: one robot, and no columns.robot
   ReadView read;
   /// Covariances of (rho, phi) in Exp(rho, phi) camera_from_world, metres and radians; empty: not known, and
-  /// no column of kSigmaColumn.
+  /// no column of kSigmaColumn. NaN: not known of this view; what only such views measured has NaN there.
   std::vector<geometry::Matrix6d> covariances = {};
 };
 

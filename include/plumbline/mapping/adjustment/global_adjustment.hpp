@@ -122,13 +122,14 @@ GlobalAdjustmentSummary adjust_map(maps::Map& map, const Cameras& cameras, const
 /// Accuracy of a keyframe's pose relative to the anchor's.
 struct KeyframeAccuracy {
   core::KeyframeId keyframe;
-  /// Covariance of (rho, phi) in Exp(rho, phi) camera_from_world, metres and radians.
+  /// Covariance of (rho, phi) in Exp(rho, phi) camera_from_world, metres and radians; NaN in the rows and
+  /// columns of a position or a rotation that nothing relates to the anchor's.
   geometry::Matrix6d covariance = geometry::Matrix6d::Zero();
   int points = 0;  ///< observations that hold it
   int lines = 0;
   int edges = 0;  ///< of its surface, alignments and loops
 
-  /// Root of the covariance's trace.
+  /// Root of the covariance's trace; NaN: not known.
   [[nodiscard]] double sigma_position_m() const {
     return std::sqrt(covariance.topLeftCorner<3, 3>().trace());
   }
@@ -137,12 +138,16 @@ struct KeyframeAccuracy {
   }
 };
 
-/// Accuracy of the keyframes of a map that adjust_map has left with the same `extra` (except rejected edges),
-/// by id: from its observations, their noise scaled by SigmaFactors. Empty if something leaves a keyframe
-/// free, and for more than 600 keyframes: time grows with the cube of their number.
-std::vector<KeyframeAccuracy> keyframe_accuracy(const maps::Map& map, const Cameras& cameras,
-                                                const std::vector<PoseEdge>& extra,
-                                                const GlobalAdjustmentOptions& options,
-                                                core::KeyframeId anchor = {});
+/// Accuracy of the keyframes of a map, by id.
+struct MapAccuracy {
+  std::vector<KeyframeAccuracy> keyframes;  ///< empty: not known
+  std::string missing;  ///< why that of some or all keyframes is not known; empty: all are known
+};
+
+/// Accuracy of the keyframes of a map that adjust_map has left with the same `extra` (except rejected edges):
+/// from its observations, their noise scaled by SigmaFactors. For its limits see optimize::pose_covariances.
+MapAccuracy keyframe_accuracy(const maps::Map& map, const Cameras& cameras,
+                              const std::vector<PoseEdge>& extra, const GlobalAdjustmentOptions& options,
+                              core::KeyframeId anchor = {});
 
 }  // namespace plumbline::mapping

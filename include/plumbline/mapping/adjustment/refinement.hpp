@@ -37,7 +37,7 @@ struct RefinementSummary {
 
 struct Refinement {
   RefinementSummary summary;
-  std::vector<KeyframeAccuracy> accuracy;  ///< accuracy of the keyframes, by id; empty: not known
+  MapAccuracy accuracy;
 };
 
 /// Moves keyframes and landmarks of `map` to where they and the surfaces of its local maps fit best.
