@@ -130,6 +130,16 @@ std::vector<Eigen::Vector3d> must_see(const Scene& scene, bool with_segments) {
   return result;
 }
 
+/// Width in pixels that a colour bar with its labels takes at the right of the picture; 0: it has none.
+double width_of_scale(const SnapshotOptions& options) {
+  constexpr double kWidth_px = 160.0;  // in a picture of this height
+  constexpr double kHeight_px = 1200.0;
+  constexpr double kMostOfWidth = 0.3;
+  const bool shown = options.annotations && options.color != ColorMode::kRgb &&
+                     options.color != ColorMode::kNormal && options.color != ColorMode::kRobot;
+  return shown ? std::min(kWidth_px * options.height_px / kHeight_px, kMostOfWidth * options.width_px) : 0.0;
+}
+
 Projection choose_projection(const Scene& scene, const SnapshotOptions& options, const SceneAxes& axes) {
   Projection directions = view_directions(options, axes);
   const bool fixed = options.view == View::kExplicit;
@@ -139,7 +149,7 @@ Projection choose_projection(const Scene& scene, const SnapshotOptions& options,
   const std::size_t step = std::max<std::size_t>(1, size / kFramingSample);
   const auto sample = positions(scene, visible_points(scene, for_culling, options.cull_back_faces, step));
   if (!fixed) {
-    fit(directions, evened(sample), must_see(scene, sample.empty()));
+    fit(directions, evened(sample), must_see(scene, sample.empty()), width_of_scale(options));
     return directions;
   }
   std::vector<double> depths;

@@ -42,19 +42,19 @@ Interval extent(const std::vector<Eigen::Vector3d>& points, const std::vector<Ei
   return interval;
 }
 
-void fit_orthographic(Projection& projection, const Interval& x, const Interval& y) {
+void fit_orthographic(Projection& projection, const Interval& x, const Interval& y, double width_px) {
   const double room = 1.0 - 2.0 * kFreeMargin;
-  const double per_metre_x = projection.width_px * room / std::max(x.high - x.low, 0.2);
+  const double per_metre_x = width_px * room / std::max(x.high - x.low, 0.2);
   const double per_metre_y = projection.height_px * room / std::max(y.high - y.low, 0.2);
   projection.focal_px = std::min(per_metre_x, per_metre_y);
 }
 
 /// Distance of the eye from the centre so that nearly all points lie inside the four sides of the view.
 double fit_distance(const Projection& projection, const Eigen::Vector3d& centre,
-                    const std::vector<Eigen::Vector3d>& points,
-                    const std::vector<Eigen::Vector3d>& must_see) {
+                    const std::vector<Eigen::Vector3d>& points, const std::vector<Eigen::Vector3d>& must_see,
+                    double width_px) {
   const double room = 1.0 - 2.0 * kFreeMargin;
-  const double tan_x = room * 0.5 * projection.width_px / projection.focal_px;
+  const double tan_x = room * 0.5 * width_px / projection.focal_px;
   const double tan_y = room * 0.5 * projection.height_px / projection.focal_px;
   const auto needed = [&](const Eigen::Vector3d& p) {
     const Eigen::Vector3d v = p - centre;
@@ -138,12 +138,19 @@ static Eigen::Vector3d forward_of(const SnapshotOptions& options, const SceneAxe
   return (options.viewpoint.target - options.viewpoint.eye).normalized();
 }
 
+/// Up of a plan on the paper: y where z is up, as in floor plans and grids; else where the first camera
+/// looked.
+static Eigen::Vector3d plan_up(const SceneAxes& axes) {
+  const bool z_up = (axes.up - Eigen::Vector3d::UnitZ()).norm() < 1e-9;
+  return z_up ? Eigen::Vector3d(Eigen::Vector3d::UnitY()) : axes.forward;
+}
+
 Projection view_directions(const SnapshotOptions& options, const SceneAxes& axes) {
   Projection view;
   const bool given = options.view == View::kExplicit;
   const bool plan = options.view == View::kTop || options.view == View::kBottom;
   view.forward = forward_of(options, axes);
-  view.up = given ? options.viewpoint.up : plan ? axes.forward : axes.up;
+  view.up = given ? options.viewpoint.up : plan ? plan_up(axes) : axes.up;
   if (given) view.eye = options.viewpoint.eye;
   view.orthographic = options.view != View::kIso && !given;
   const double field_of_view = given ? options.viewpoint.field_of_view_deg * kDegree : kIsoFieldOfView;
@@ -156,7 +163,8 @@ Projection view_directions(const SnapshotOptions& options, const SceneAxes& axes
 }
 
 void fit(Projection& projection, const std::vector<Eigen::Vector3d>& points,
-         const std::vector<Eigen::Vector3d>& must_see) {
+         const std::vector<Eigen::Vector3d>& must_see, double kept_free_px) {
+  const double width_px = projection.width_px - kept_free_px;
   const Interval x = extent(points, must_see, projection.right);
   const Interval y = extent(points, must_see, projection.up);
   const Interval z = extent(points, must_see, projection.forward);
@@ -167,11 +175,12 @@ void fit(Projection& projection, const std::vector<Eigen::Vector3d>& points,
 
   double distance = 2.0 * depth + 1.0;
   if (projection.orthographic) {
-    fit_orthographic(projection, x, y);
+    fit_orthographic(projection, x, y, width_px);
   } else {
-    distance = fit_distance(projection, centre, points, must_see);
+    distance = fit_distance(projection, centre, points, must_see, width_px);
   }
-  projection.eye = centre - distance * projection.forward;
+  const double aside_m = 0.5 * kept_free_px / projection.pixels_per_metre(distance);
+  projection.eye = centre - distance * projection.forward + aside_m * projection.right;
 
   // Some points may lie outside; half as much depth again includes them without wasting depth precision.
   projection.near_m = std::max(distance - 1.0 * depth, 0.05 * distance);

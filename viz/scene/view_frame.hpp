@@ -43,9 +43,10 @@ struct Projection {
 Projection view_directions(const SnapshotOptions& options, const SceneAxes& axes);
 
 /// Places the camera so that all but a few in a thousand of `points` and all of `must_see` lie in the
-/// picture; sets the depth range.
+/// picture; sets the depth range. `kept_free_px`: width at the right of the picture in which nothing is to
+/// lie, for a colour bar.
 void fit(Projection& projection, const std::vector<Eigen::Vector3d>& points,
-         const std::vector<Eigen::Vector3d>& must_see);
+         const std::vector<Eigen::Vector3d>& must_see, double kept_free_px = 0.0);
 
 /// One point (the first) per cube of about 1/60 of the extent: dense surfaces near a camera then count no
 /// more than sparse ones far away, which would be cut off otherwise.

@@ -221,6 +221,52 @@ TEST_F(Snapshots, TopViewIsAPlanWithoutCeiling) {
   }
 }
 
+TEST_F(Snapshots, TopViewOfAnUprightMapHasXToTheRight) {
+  // As floor plans and grids; wherever the first camera looked.
+  Scene scene;
+  auto cloud = std::make_shared<Cloud>();
+  for (double x = 0.0; x < 2.0; x += 0.02) {
+    for (double y = 0.0; y < 1.0; y += 0.02) {
+      const Rgb color = x > 1.8 ? Rgb{220, 30, 30} : y > 0.8 ? Rgb{30, 30, 220} : Rgb{128, 128, 128};
+      cloud->push_back(point({x, y, 0.0}, Eigen::Vector3d::UnitZ(), color));
+    }
+  }
+  scene.cloud = cloud;
+
+  SnapshotOptions options = small(View::kTop);
+  options.up = Eigen::Vector3d::UnitZ();
+  for (const double yaw : {0.0, 1.6, 3.0}) {
+    Eigen::Matrix3d camera;  // x right, y down, z ahead
+    camera.col(2) = Eigen::Vector3d(std::cos(yaw), std::sin(yaw), 0.0);
+    camera.col(1) = -Eigen::Vector3d::UnitZ();
+    camera.col(0) = camera.col(1).cross(camera.col(2));
+    scene.paths.assign(1, {});
+    scene.paths[0].trajectory.push_back({0.0, {camera, Eigen::Vector3d(1.0, 0.5, 1.5)}});
+
+    const cv::Mat picture = render(scene, options);
+    EXPECT_GT(find(picture, Hue::kRed).x, 0.8) << yaw;
+    EXPECT_LT(find(picture, Hue::kBlue).y, 0.4) << yaw;
+  }
+}
+
+TEST_F(Snapshots, NothingLiesBehindTheColorBar) {
+  Scene scene = make_room();
+  for (std::size_t i = 0; i < scene.cloud->size(); ++i) scene.scalars.push_back(0.0F);
+  for (const View view : {View::kTop, View::kIso, View::kFront}) {
+    SnapshotOptions options = small(view);
+    options.width_px = 300;  // the room fills the width
+    options.color = ColorMode::kError;
+    options.scalar_range = {1.0, 2.0};
+    options.annotations = true;
+    const cv::Mat with_bar = render(scene, options, "bar.png");
+    const cv::Mat bar_place = with_bar(cv::Rect(300 - 36, 170, 36, 50));  // below the bar, above the axes
+    for (int y = 0; y < bar_place.rows; ++y) {
+      for (int x = 0; x < bar_place.cols; ++x)
+        ASSERT_TRUE(is(bar_place.at<cv::Vec3b>(y, x), Hue::kBackground)) << view_name(view) << x << "," << y;
+    }
+  }
+}
+
 TEST_F(Snapshots, CeilingHidesThePlanWhenCullingIsOff) {
   SnapshotOptions options = small(View::kTop);
   options.cull_back_faces = false;
