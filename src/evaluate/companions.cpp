@@ -50,4 +50,21 @@ std::vector<TrajectoryFiles> find_trajectories(const fs::path& cloud, const fs::
   return pairs;
 }
 
+std::vector<std::string> other_truths(const fs::path& truth) {
+  constexpr const char* kBegin = "groundtruth";
+  const std::string own = truth.filename().string();
+  std::vector<std::string> names;
+  if (own.rfind(kBegin, 0) != 0) return names;
+
+  std::error_code error;
+  for (fs::directory_iterator it(folder_of(truth), error), end; !error && it != end; it.increment(error)) {
+    const std::string name = it->path().filename().string();
+    const fs::path ending = it->path().extension();
+    if (name.rfind(kBegin, 0) == 0 && name != own && (ending == ".txt" || ending == ".csv"))
+      names.push_back(name);
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
 }  // namespace plumbline::evaluate

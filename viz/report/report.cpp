@@ -25,6 +25,12 @@ bool is_report(const fs::path& file) {
   return head.rfind("<!DOCTYPE html>", 0) == 0 && head.find(kReportGenerator) != std::string::npos;
 }
 
+/// A camera that was lost has a second map, which is joined like that of another robot.
+std::string merges_title(const ReportData& data) {
+  const bool several = data.fused_afterwards || data.paths.size() > 1 || data.frames.size() > 1;
+  return several ? "Merges of robots' maps" : "Maps of a camera that was lost, joined";
+}
+
 core::Result<void> check_output(const fs::path& file, bool replace) {
   std::error_code ec;
   if (fs::is_directory(file, ec)) {
@@ -75,7 +81,7 @@ core::Result<ReportSummary> write_report(const ReportRequest& request, const cor
        {"exports", "Exports", exports_html(*data)},
        {"tracking", "Tracking over time", tracking_html(*data)},
        {"loops", "Loops", loops_html(*data)},
-       {"merges", "Merges of robots' maps", merges_html(*data)},
+       {"merges", merges_title(*data), merges_html(*data)},
        {"refinement", "Refinement of the whole", refinement_html(*data)},
        {"cloud", "The cloud", cloud_html(*data)},
        {"accuracy", "Accuracy", accuracy_html(*data)},

@@ -15,7 +15,7 @@ std::string head_html(const ReportData& data);
 /// The folder's snapshots; if it has none, they are drawn now. `scratch`: folder for temporary pictures.
 core::Result<std::string> pictures_html(ReportData& data, const std::filesystem::path& scratch);
 /// The map to turn and walk through; empty without a cloud. If it cannot be shown, `data` says so. Errors
-/// (kInput): request.other cannot be read.
+/// (kInput): request.other cannot be read; (kUntrustworthy): it cannot be laid over the map.
 core::Result<std::string> viewer_html(ReportData& data, const ReportRequest& request,
                                       const core::Executor& executor, core::Log& log);
 /// The paths from above, over the plan of the cloud.
@@ -37,6 +37,12 @@ std::string files_html(const ReportData& data, const std::filesystem::path& left
 inline std::string count_at(const nlohmann::ordered_json& json, const std::string& place) {
   return count_text(number_at(json, place));
 }
+
+/// Note on what standard deviations leave out, for each place that shows them.
+inline constexpr const char* kSigmaNote =
+    "Standard deviations count noise alone. What all measurements share, such as a wrong focal length or "
+    "depth "
+    "that is off everywhere, is not in them: the true error exceeds them.";
 
 /// CSS classes of a robot's marks.
 inline std::string robot_kind(std::size_t robot) { return "k" + std::to_string(robot % 8); }

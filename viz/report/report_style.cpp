@@ -45,6 +45,9 @@ tr.no td:first-child{color:var(--muted)}
 tr.bad td{background:none}tr.bad td:nth-child(2){color:var(--bad);font-weight:600}
 .facts th{color:var(--muted);font-weight:400;padding-right:1.6em;white-space:nowrap}
 figure{margin:0}
+figure>img{display:block;max-width:100%;height:auto}
+.plans figure{margin:0 0 1.2em}
+.plans img{margin:0 auto;background:#fff;border:1px solid var(--rule);border-radius:6px}
 .pictures{display:grid;grid-template-columns:repeat(2,1fr);gap:1em}
 .pictures figure:first-child,.pictures.even figure:nth-child(2){grid-column:1/-1}
 .pictures img{width:100%;height:auto;display:block;border:1px solid var(--rule);border-radius:6px;background:#fff}
@@ -55,7 +58,8 @@ font:12.5px/1.45 ui-monospace,"DejaVu Sans Mono",Menlo,Consolas,monospace}
 footer{margin-top:3em;color:var(--muted);font-size:.85em;border-top:1px solid var(--rule);padding-top:.8em}
 @media(max-width:640px){.pictures{grid-template-columns:1fr}main{padding:1.2em .8em}}
 @page{margin:14mm}
-@media print{body{font-size:10.5pt}main{max-width:none;padding:0}nav{display:none}section{margin-top:1.4em}
+@media print{.screen{display:none}.plans img{max-height:225mm}
+body{font-size:10.5pt}main{max-width:none;padding:0}nav{display:none}section{margin-top:1.4em}
 *{-webkit-print-color-adjust:exact;print-color-adjust:exact}h2,h3{break-after:avoid}
 figure,tr,.tiles,.verdict{break-inside:avoid}thead{display:table-header-group}.scroll{overflow:visible}
 pre{white-space:pre-wrap;overflow-wrap:anywhere}.pictures figure:first-child img{max-height:150mm;width:auto;margin:auto}details>summary{color:inherit}}

@@ -21,4 +21,8 @@ struct TrajectoryFiles {
 std::vector<TrajectoryFiles> find_trajectories(const std::filesystem::path& cloud,
                                                const std::filesystem::path& reference);
 
+/// Names of other files beside a true path that may be true paths, too (groundtruth*.txt, *.csv), sorted;
+/// none if its own name does not begin so.
+std::vector<std::string> other_truths(const std::filesystem::path& truth);
+
 }  // namespace plumbline::evaluate

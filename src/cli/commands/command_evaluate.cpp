@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // plumbline evaluate trajectory EST... GT
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <fstream>
@@ -14,6 +15,7 @@
 #include "paths.hpp"
 #include "plumbline/dataset/recording_poses.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
+#include "plumbline/evaluate/companions.hpp"
 #include "plumbline/evaluate/trajectory.hpp"
 #include "plumbline/maps/result_folder.hpp"
 #include "plumbline/viz/trajectory_plots.hpp"
@@ -134,6 +136,11 @@ core::Result<std::vector<evaluate::NamedReport>> measure_paths(const TrajectoryR
 
   for (const std::string& note : truth->notes)
     console.warning(fmt::format("{}: {}", truth_file.string(), note));
+  const std::vector<std::string> others = evaluate::other_truths(truth_file);
+  if (!others.empty()) {
+    console.info(fmt::format("the truth is {}; beside it there are {}: name a file to take another",
+                             truth_file.string(), fmt::join(others, ", ")));
+  }
   std::vector<double> stamps;
   if (!request.frames.empty()) {
     auto read = evaluate::read_frame_stamps(request.frames);

@@ -404,6 +404,30 @@ const cases = {
     await browser.close()
   },
 
+  /** A report on a screen and on paper: nothing is wider than the window, and WORK/report.pdf shows the map. */
+  async print() {
+    const browser = await launch()
+    for (const width of [1300, 420]) {
+      const page = await open(browser, { width, height: 900 })
+      const wide = await page.evaluate(() => document.documentElement.scrollWidth)
+      check(wide <= width, `the page is ${wide} pixels wide in a window of ${width}`)
+      for (const w of await page.$$eval('.plans img', (all) => all.map((e) => e.getBoundingClientRect().width)))
+        check(w > 0.5 * width * Math.min(1, 1040 / width) && w < width, `a plan is ${w} pixels wide in a window of ${width}`)
+      await page.close()
+    }
+    const page = await open(browser, { width: 1300, height: 1000 })
+    await rest(page)
+    await page.pdf({ path: path.join(work, 'report.pdf'), format: 'A4', preferCSSPageSize: true, printBackground: true })
+    const paper = await page.$eval('.pv-paper', (c) => {
+      const { data } = c.getContext('2d').getImageData(0, 0, c.width, c.height)
+      const colors = new Set()
+      for (let i = 0; i < data.length; i += 4000) colors.add(`${data[i]},${data[i + 1]},${data[i + 2]}`)
+      return colors.size
+    })
+    check(paper > 20, `the map on paper has ${paper} colours`)
+    await browser.close()
+  },
+
   /** Two results over one another: each shows itself, both are tinted, and the distances are those of their points. */
   async two() {
     const browser = await launch(), page = await open(browser, { width: 1300, height: 1000 })

@@ -450,6 +450,7 @@ def case_clouds(case):
         loaded = int(re.search(rb"element vertex (\d+)", again.read_bytes()[:2000]).group(1))
         print(f"{name}: PCL reads {loaded} points")
         check(loaded == count, f"{name}: PCL reads {loaded} of {count} points")
+        check(b"\n# frame: " in (case.work / name).read_bytes()[:300], f"{name}: says no frame")
     for name in ("mesh.obj", "mesh.ply"):
         said = run(*opened, case.export(name, "--mesh", "--resolution", "0.05"), env=env)
         faces, corners = map(int, re.search(r"Found one mesh with (\d+) faces and (\d+) vertices", said).groups())
@@ -506,6 +507,47 @@ def case_viewer_two(case):
         finally:
             server.terminate()
     viewer("two", served)
+
+
+def ink_of(pdf, work):
+    """Of each page: the dark share of all, and of the margin at the right, of 10 mm."""
+    need("pdftoppm")
+    for old in work.glob("page-*.pgm"):
+        old.unlink()
+    run("pdftoppm", "-r", "50", "-gray", pdf, work / "page")
+    pages = []
+    for picture in sorted(work.glob("page-*.pgm")):
+        head = re.match(rb"P5\s+(\d+)\s+(\d+)\s+255\s", picture.read_bytes())
+        width, height = int(head.group(1)), int(head.group(2))
+        dots = picture.read_bytes()[head.end():]
+        margin = int(width * 10 / 210)
+        dark = [sum(1 for d in dots[y * width + x0:(y + 1) * width] if d < 200) for y in range(height) for x0 in (0, width - margin)]
+        pages.append((sum(dark[0::2]) / (width * height), sum(dark[1::2]) / (margin * height)))
+    return pages
+
+
+def case_report_print(case):
+    """A report with a plan fits its page, on the screen and on A4."""
+    need("pdftotext")
+    result = case.work / "printed"
+    shutil.rmtree(result, ignore_errors=True)
+    shutil.copytree(case.map, result)
+    run(case.program, "export", result, "-o", result / "plan.svg")
+    page = case.work / "report.html"
+    run(case.program, "report", result, "-o", page, "--force", "-q")
+    viewer("print", page)
+
+    pdf = page.with_suffix("") / "report.pdf"
+    pages = ink_of(pdf, pdf.parent)
+    print("dark share of the pages in percent: " + " ".join(f"{100 * all_:.1f}" for all_, _ in pages))
+    check(3 <= len(pages) <= 25, f"{len(pages)} pages")
+    for number, (all_, margin) in enumerate(pages, 1):
+        check(all_ > 0.004, f"page {number} is nearly empty")
+        check(margin == 0.0, f"page {number} is cut off at the right")
+    text = run("pdftotext", pdf, "-")
+    for word in ("The map to walk through", "plan.svg", "Trustworthy"):
+        check(word in text, f"'{word}' is not on paper")
+    check("Drag to turn" not in text, "paper cannot be dragged")
 
 
 def case_viewer_firefox(case):

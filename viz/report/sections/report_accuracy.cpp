@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The paths of a report against the truth, and evaluations that were put into the folder.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -175,6 +176,16 @@ std::string saved_html(const ReportData& data) {
 
 }  // namespace
 
+/// Adds the name of a true path, and of others beside it that were not taken.
+static void name_truth(const std::string& robot, const fs::path& file, ReportData& data) {
+  const std::string name = file.filename().string();
+  std::string text = robot.empty() ? name : fmt::format("{} of {}", name, robot);
+  const std::vector<std::string> others = evaluate::other_truths(file);
+  if (!others.empty())
+    text += fmt::format(" (beside it: {}; --truth FILE takes another)", fmt::join(others, ", "));
+  data.truth += (data.truth.empty() ? "" : "; ") + text;
+}
+
 core::Result<void> add_truth(const fs::path& truth, ReportData& data) {
   std::vector<std::pair<geometry::Trajectory, geometry::Trajectory>> pairs;
   for (const auto& [index, file] : truths_of(truth, data)) {
@@ -189,6 +200,7 @@ core::Result<void> add_truth(const fs::path& truth, ReportData& data) {
     }
 
     path.accuracy = std::move(*report);
+    name_truth(path.robot, file, data);
     pairs.emplace_back(path.poses, std::move(*poses));
   }
 
@@ -212,7 +224,7 @@ std::string accuracy_html(const ReportData& data) {
       std::any_of(data.paths.begin(), data.paths.end(), [](const auto& p) { return p.accuracy.has_value(); });
   std::string out;
   if (measured) {
-    out += errors_table(data) + error_chart(data);
+    out += paragraph("Compared with " + data.truth + ".") + errors_table(data) + error_chart(data);
     for (const ReportPath& path : data.paths) {
       if (!path.accuracy) continue;
       for (const std::string& warning : path.accuracy->warnings) {

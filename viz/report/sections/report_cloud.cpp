@@ -188,7 +188,8 @@ std::string cloud_html(const ReportData& data) {
     }
   }
 
-  return facts_html(facts) + out;
+  const bool sigma = number_at(data.summary, "/cloud/sigma_m/median") > 0.0;
+  return facts_html(facts) + (sigma ? note(kSigmaNote) : "") + out;
 }
 
 }  // namespace plumbline::report

@@ -73,6 +73,7 @@ std::string exports_html(const ReportData& data) {
         "src=\"data:image/svg+xml;base64,{1}\"/><figcaption>{0}</figcaption></figure>\n",
         name, base64(bytes));
   }
+  if (!pictures.empty()) pictures = "<div class=\"plans\">" + pictures + "</div>\n";
   return pictures + "<ul>\n" + links + "</ul>\n" + note("Files beside this page, made by plumbline export.");
 }
 

@@ -264,6 +264,7 @@ std::string refinement_html(const ReportData& data) {
   facts.emplace_back("Standard deviation of keyframes relative to the first", sigma_text(s));
 
   std::string out = facts_html(facts);
+  if (number_at(s, "/refine/sigma_position_m/median") > 0.0) out += note(kSigmaNote);
   out += adjustment_html(s);
   return out + cameras_html(s) + fit_html(data);
 }
