@@ -152,6 +152,7 @@ Json scene_json(const Scene& scene, Pieces& pieces, Cost& cost) {
   json["frame"] = scene.frame;
   json["up"] = scene.z_up;
   json["floor"] = rounded(scene.floor_m);
+  if (!scene.placing.empty()) json["placing"] = scene.placing;
 
   json["clouds"] = Json::array();
   for (const Points& points : scene.clouds)

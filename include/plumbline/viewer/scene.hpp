@@ -74,6 +74,7 @@ struct Scene {
   bool z_up = true;            ///< else y is down, and the page turns the map upright for the eye alone
   double floor_m = 0.0;        ///< height of the floor; known only where z is up
   std::vector<Points> clouds;  ///< one, or two that are shown over one another
+  std::string placing;         ///< of two: a sentence for people, how they were laid together and how well
   std::vector<CameraPath> paths;
   std::vector<Keyframe> keyframes;
   std::vector<Segment> lines;

@@ -7,8 +7,6 @@
 #include <cstdint>
 #include <nanoflann.hpp>
 
-#include "plumbline/geometry/alignment.hpp"
-
 namespace plumbline::exports {
 namespace {
 
@@ -53,34 +51,6 @@ std::vector<float> distances(const viewer::Points& points, const viewer::Points&
 }
 
 }  // namespace
-
-std::optional<geometry::Rigid3> first_from_second(const std::vector<ExportPose>& first,
-                                                  const std::vector<ExportPose>& second) {
-  constexpr double kSame_s = 5e-4;
-  std::vector<Eigen::Vector3d> from;
-  std::vector<Eigen::Vector3d> to;
-  const auto earlier = [](const ExportPose& a, const ExportPose& b) {
-    return a.robot != b.robot ? a.robot < b.robot : a.stamp < b.stamp;
-  };
-
-  for (const ExportPose& pose : second) {
-    ExportPose wanted = pose;
-    wanted.stamp -= kSame_s;
-    const auto found = std::lower_bound(first.begin(), first.end(), wanted, earlier);
-    if (found == first.end() || found->robot != pose.robot || found->stamp > pose.stamp + kSame_s) continue;
-
-    // With the places a metre along each axis, so that a straight path tells a turn about itself as well.
-    for (int k = -1; k < 3; ++k) {
-      const Eigen::Vector3d way =
-          k < 0 ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : Eigen::Vector3d(Eigen::Vector3d::Unit(k));
-      from.push_back(pose.world_from_camera * way);
-      to.push_back(found->world_from_camera * way);
-    }
-  }
-
-  if (from.size() < 12) return std::nullopt;
-  return geometry::align_points(from, to);
-}
 
 void move(viewer::Points& points, const geometry::Rigid3& target_from_source) {
   const Eigen::Vector3d shift(points.shift[0], points.shift[1], points.shift[2]);

@@ -15,6 +15,7 @@
 
 #include "formats.hpp"
 #include "pages/compare.hpp"
+#include "pages/placing.hpp"
 #include "pages/seen_from.hpp"
 #include "pages/thumbnails.hpp"
 #include "paths/lines.hpp"
@@ -336,19 +337,14 @@ core::Result<MapView> view_of_two(const ExportRequest& first, const ExportReques
   auto added = shown_cloud(*other);
   if (!added) return tl::unexpected(added.error());
 
-  const auto poses = one->poses(false);
-  const auto other_poses = other->poses(false);
-  std::optional<geometry::Rigid3> moved;
-  if (poses && other_poses) moved = first_from_second(*poses, *other_poses);
-  if (moved) {
-    move(added->second, *moved);
-  } else {
-    view->notes.push_back(fmt::format("{} and {} have no frames in common: each lies in its own frame",
-                                      one->name(), other->name()));
-  }
-
   viewer::Scene& scene = view->scene;
   if (added->second.name == scene.clouds.front().name) added->second.name += " (second)";
+  const auto placed = place_second(*one, scene.clouds.front(), *other, added->second);
+  if (!placed) return tl::unexpected(placed.error());
+  move(added->second, placed->first_from_second);
+  scene.placing = placed->how;
+  view->notes.push_back(placed->how);
+
   add_distances(scene.clouds.front(), added->second, executor);
   scene.clouds.push_back(std::move(added->second));
   return view;

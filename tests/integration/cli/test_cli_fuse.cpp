@@ -101,6 +101,21 @@ TEST_F(Fuse, TwoMapsOfOneRoomInAnyOrder) {
   }
 }
 
+TEST_F(Fuse, MapsWithoutCommonFramesAreShownTogether) {
+  ASSERT_EQ(
+      run("synth room -o world --frames 80 --fps 10 --width 320 --height 240 --reference-spacing 10cm -q")
+          .code,
+      0);
+  ASSERT_EQ(run("map world/robot0 -o a --every 2" + std::string(kLean)).code, 0);
+  ASSERT_EQ(run("map world/robot0 -o b --from 0.1 --every 2" + std::string(kLean)).code, 0);
+
+  const Outcome shown = run("report a b -o ab.html");
+  ASSERT_EQ(shown.code, 0) << shown;
+  const std::string page = slurp(path("ab.html"));
+  EXPECT_NE(page.find("a and b are aligned by places that both show"), std::string::npos);
+  EXPECT_NE(page.find("% of the points of b lie at surfaces of a"), std::string::npos);
+}
+
 TEST_F(Fuse, WorldsThatDoNotConnectStayApart) {
   ASSERT_EQ(
       run("synth room -o room --frames 20 --fps 10 --width 320 --height 240 --reference-spacing 10cm -q")
@@ -120,6 +135,12 @@ TEST_F(Fuse, WorldsThatDoNotConnectStayApart) {
   EXPECT_FALSE(summary["trustworthy"]);
   EXPECT_FALSE(summary["merges"][0]["accepted"]);
   EXPECT_FALSE(std::string(summary["merges"][0]["reason"]).empty());
+
+  // Nor are they shown over one another, although all generated recordings begin at the same time.
+  const Outcome shown = run("report a b -o both.html");
+  EXPECT_EQ(shown.code, 4) << shown;
+  EXPECT_TRUE(shown.told("a and b cannot be aligned")) << shown;
+  EXPECT_FALSE(fs::exists(path("both.html")));
 }
 
 TEST_F(Fuse, RobotsSideBySideMeetWhileTheyMap) {

@@ -127,6 +127,9 @@ TEST_F(Report, HoldsTheMapToWalkThrough) {
   ASSERT_EQ(two.size(), 2U);
   EXPECT_EQ(two[1]["name"], "other");
   for (const auto& one : two) EXPECT_EQ(one["layers"].back()["key"], "distance");
+  const std::string together = slurp(path("out/report.html"));
+  EXPECT_EQ(count_of("out and other are aligned by 12 cameras of the same time", together), 2U)
+      << "page and viewer";
   EXPECT_EQ(run("report out nothing --force").code, 3);
 }
 

@@ -28,10 +28,15 @@ core::Result<std::string> viewer_html(ReportData& data, const ReportRequest& req
 
   view->scene.name = data.name;
   view->scene.clouds.front().name = data.name;
-  return viewer::fragment(
+  const std::string placing =
+      view->scene.placing.empty() ? std::string() : paragraph(view->scene.placing + ".");
+  return placing +
+         viewer::fragment(
              view->scene,
              note("This browser has no WebGL 2 or runs no scripts; the pictures below show the map.")) +
-         note("Drag to turn, wheel to come nearer (after a click into the picture), ? for all keys.");
+         "<div class=\"screen\">" +
+         note("Drag to turn, wheel to come nearer (after a click into the picture), ? for all keys.") +
+         "</div>\n";
 }
 
 }  // namespace plumbline::report
