@@ -17,7 +17,8 @@ std::vector<LineSegment3> line_segments(const Map& map, std::size_t min_observat
 
 core::Result<void> write_lines_ply(const std::filesystem::path& file,
                                    const std::vector<LineSegment3>& segments,
-                                   const std::vector<std::array<std::uint8_t, 3>>& colors) {
+                                   const std::vector<std::array<std::uint8_t, 3>>& colors,
+                                   const std::vector<std::string>& comments) {
   if (!colors.empty() && colors.size() != segments.size()) {
     return core::failure(core::ErrorKind::kInternal, file.string() + ": as many colours as lines are needed");
   }
@@ -27,6 +28,7 @@ core::Result<void> write_lines_ply(const std::filesystem::path& file,
   std::array<std::vector<std::uint8_t>, 3> color;
   cloud::PlyData ply;
   ply.comments = {"plumbline, line landmarks, metres"};
+  ply.comments.insert(ply.comments.end(), comments.begin(), comments.end());
 
   for (std::size_t i = 0; i < segments.size(); ++i) {
     const auto& [start, end] = segments[i];

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <array>
+#include <fstream>
+#include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "plumbline/cloud/io/ply.hpp"
@@ -41,12 +43,30 @@ core::Result<ResultFolder> open_result(const std::filesystem::path& folder) {
   return ResultFolder{folder};
 }
 
+cloud::CloudFrame frame_of_result(const ResultFolder& result) {
+  std::ifstream stream(result.summary(), std::ios::binary);
+  const auto summary = nlohmann::json::parse(stream, nullptr, false);
+  const nlohmann::json::json_pointer place("/frame/up");
+  if (!summary.is_object() || !summary.contains(place) || !summary.at(place).is_string()) return {};
+  return cloud::frame_with(summary.at(place) == "none" ? cloud::Up::kMinusY : cloud::Up::kZ);
+}
+
+cloud::CloudFrame frame_of_cloud(const std::filesystem::path& file, const cloud::CloudFrame& said) {
+  if (said.known() || file.filename().string().rfind("map", 0) != 0) return said;
+
+  std::filesystem::path folder = std::filesystem::absolute(file).lexically_normal().parent_path();
+  if (folder.filename() == "levels") folder = folder.parent_path();
+  if (folder.parent_path().filename() == "components") folder = folder.parent_path().parent_path();
+  return is_result_folder(folder) ? frame_of_result(ResultFolder{folder}) : said;
+}
+
 core::Result<cloud::CloudFile> read_result_cloud(const ResultFolder& result) {
   std::error_code ec;
-  if (!std::filesystem::exists(result.ply(), ec) && std::filesystem::exists(result.pcd(), ec)) {
-    return cloud::read_cloud(result.pcd());
-  }
-  return cloud::read_cloud(result.ply());
+  const bool pcd = !std::filesystem::exists(result.ply(), ec) && std::filesystem::exists(result.pcd(), ec);
+  const std::filesystem::path name = pcd ? result.pcd() : result.ply();
+  auto file = cloud::read_cloud(name);
+  if (file) file->frame = frame_of_cloud(name, file->frame);
+  return file;
 }
 
 core::Result<std::vector<LineSegment3>> read_lines_ply(const std::filesystem::path& file) {

@@ -170,10 +170,14 @@ core::Result<cloud::FusedCloud> StoredRun::fused(const cloud::DenseFusionOptions
   return fusion_filters().apply(std::move(*fused), options.voxels.voxel_m, executor);
 }
 
+cloud::CloudFrame StoredRun::frame() const {
+  return cloud::frame_with(map_.result.upright ? cloud::Up::kZ : cloud::Up::kMinusY);
+}
+
 core::Result<std::size_t> StoredRun::write_keyframe_clouds(const fs::path& folder) const {
   const auto stored = views();
   if (!stored) return tl::unexpected(stored.error());
-  return maps::write_keyframe_clouds(folder, *stored, map_.result.output_from_map,
+  return maps::write_keyframe_clouds(folder, *stored, map_.result.output_from_map, frame(),
                                      [&](std::size_t i) { return stored->read(i); });
 }
 
@@ -189,6 +193,7 @@ core::Result<cloud::CloudFile> read_map_cloud(const MapPlace& place, const core:
   cloud::CloudFile file;
   file.cloud = std::move(fused->cloud);
   file.columns = std::move(fused->columns);
+  file.frame = stored->frame();
   file.has_color = true;
   file.has_normals = true;
   return file;

@@ -134,7 +134,7 @@ core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& ma
 
 core::Result<std::size_t> write_keyframe_clouds(
     const std::filesystem::path& folder, const StoredViews& views, const geometry::Rigid3& output_from_map,
-    const std::function<core::Result<cloud::CloudPtr>(std::size_t)>& read) {
+    const cloud::CloudFrame& frame, const std::function<core::Result<cloud::CloudPtr>(std::size_t)>& read) {
   if (auto made = core::make_folder(folder); !made) return tl::unexpected(made.error());
   std::size_t written = 0;
   for (std::size_t i = 0; i < views.size(); ++i) {
@@ -145,7 +145,8 @@ core::Result<std::size_t> write_keyframe_clouds(
     cloud::transform(**cloud, output_from_map * views.world_from_camera[i] * cloud::sensor_pose(**cloud));
     const std::string name =
         id.robot == 0 ? fmt::format("{:06}.ply", id.index) : fmt::format("{}_{:06}.ply", id.robot, id.index);
-    if (auto done = cloud::write_ply(folder / name, **cloud); !done) return tl::unexpected(done.error());
+    auto done = cloud::write_ply(folder / name, **cloud, {}, Eigen::Vector3d::Zero(), frame.comments());
+    if (!done) return tl::unexpected(done.error());
     ++written;
   }
   return written;

@@ -63,6 +63,7 @@ cloud::PlyData as_ply(const evaluate::SurfaceSamples& cloud, const std::vector<f
   ply.shift = {cloud.shift.x(), cloud.shift.y(), cloud.shift.z()};
   ply.comments = {"error: distance in metres",
                   fmt::format("colours: 0 (dark blue) to {:g} mm and more (yellow)", 1000.0 * end_m)};
+  for (std::string& comment : cloud.frame.comments()) ply.comments.push_back(std::move(comment));
   return ply;
 }
 
@@ -85,15 +86,16 @@ viz::Scene as_scene(const evaluate::SurfaceSamples& cloud, const std::vector<flo
 
 core::Result<void> write_error_cloud(const std::filesystem::path& file, const std::string& title,
                                      const evaluate::SurfaceSamples& cloud, const std::vector<float>& error_m,
-                                     const std::vector<geometry::Trajectory>& cameras) {
+                                     const ErrorView& view) {
   if (auto made = core::make_folder(file.parent_path()); !made) return made;
   const double end_m = color_end_m(error_m);
   if (auto done = cloud::write_ply(file.string() + ".ply", as_ply(cloud, error_m, end_m)); !done) return done;
   viz::Scene scene = as_scene(cloud, error_m);
   scene.title = title;
-  for (const geometry::Trajectory& camera : cameras) scene.paths.push_back({"", camera, {90, 94, 102}});
+  for (const geometry::Trajectory& camera : view.cameras) scene.paths.push_back({"", camera, {90, 94, 102}});
   viz::SnapshotOptions options;
   options.color = viz::ColorMode::kError;
+  options.up = view.up;
   options.scalar_range = {0.0, 1000.0 * end_m};
   return viz::render_snapshot(scene, options, file.string() + ".png");
 }

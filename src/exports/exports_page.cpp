@@ -78,8 +78,8 @@ An export that cannot be made, such as a plan without walls, only causes a warni
 
 All exports of one map are in one frame, that of its results: metres, right-handed, z up, 0 on the floor, x along the
 walls ([dense_cloud.md](dense_cloud.md)). Grid, cloud, LAS, octree, COLMAP model and path coincide; only GLB is turned to
-glTF's axes, and `--datum` and `--epsg` move their outputs. Each file that can hold text names its frame. For an
-interrupted run the floor is searched during the export.
+glTF's axes, and `--datum` and `--epsg` move their outputs. Each file that can hold text names its frame, PLY and PCD
+[as a comment](../reference/files.md#frames-of-clouds) that is read again. For an interrupted run the floor is searched during the export.
 
 `--datum LAT,LON,HEADING` gives the position of the map's origin on WGS 84 and the direction of its x axis (degrees
 clockwise from true north); the map is moved into the UTM zone there, turned by the zone's convergence and scaled by its

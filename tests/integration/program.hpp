@@ -24,6 +24,13 @@ inline std::string slurp(const fs::path& file) {
   return text.str();
 }
 
+/// A PLY without the comment that names its frame, which the files of a result folder do not have.
+inline std::string without_frame(std::string ply) {
+  const std::size_t from = ply.find("comment frame: ");
+  if (from != std::string::npos) ply.erase(from, ply.find('\n', from) + 1 - from);
+  return ply;
+}
+
 inline nlohmann::json read_json(const fs::path& file) {
   return nlohmann::json::parse(slurp(file), nullptr, false);
 }

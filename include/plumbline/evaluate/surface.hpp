@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "plumbline/cloud/io/frame.hpp"
 #include "plumbline/cloud/types.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/geometry/rigid3.hpp"
@@ -21,6 +22,7 @@ struct SurfaceSamples {
   std::vector<Eigen::Vector3f> normals;             ///< unit; zero = unknown
   std::vector<std::uint8_t> visible;                ///< not 0: some camera could have seen it
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();  ///< a point is at `shift` + its coordinates
+  cloud::CloudFrame frame = {};                     ///< as the file's header says
 };
 
 struct TriangleMesh {
@@ -35,6 +37,7 @@ struct Reference {
   SurfaceSamples samples;
   TriangleMesh mesh;
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();  ///< as SurfaceSamples::shift, of both
+  cloud::CloudFrame frame = {};                     ///< as SurfaceSamples::frame, of both
 };
 
 /// Reads a PLY (x y z, optional nx ny nz, `visible`, and faces, polygons being split into fans) or, without

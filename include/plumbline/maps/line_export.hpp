@@ -23,10 +23,11 @@ std::vector<LineSegment3> line_segments(const Map& map, std::size_t min_observat
 
 /// Binary PLY with two coloured vertices and one coloured edge per segment (MeshLab, CloudCompare and
 /// Open3D's LineSet read it). `colors`: red, green, blue, one per segment, or empty for dark blue. Segments
-/// that are not finite are left out. Errors (kOutput); kInternal when the numbers of colours and segments
-/// differ.
+/// that are not finite are left out. `comments`: further lines of the header. Errors (kOutput); kInternal
+/// when the numbers of colours and segments differ.
 core::Result<void> write_lines_ply(const std::filesystem::path& file,
                                    const std::vector<LineSegment3>& segments,
-                                   const std::vector<std::array<std::uint8_t, 3>>& colors = {});
+                                   const std::vector<std::array<std::uint8_t, 3>>& colors = {},
+                                   const std::vector<std::string>& comments = {});
 
 }  // namespace plumbline::maps

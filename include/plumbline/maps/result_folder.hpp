@@ -29,7 +29,14 @@ struct ResultFolder {
 /// Errors (kInput): no such folder, or not a result.
 core::Result<ResultFolder> open_result(const std::filesystem::path& folder);
 
-/// map.ply, or map.pcd if the pipeline wrote no PLY.
+/// The frame of all that the folder holds, as its summary.json says; nothing if that cannot be read.
+cloud::CloudFrame frame_of_result(const ResultFolder& result);
+
+/// The frame of a cloud's file: `said`, as its header has it, or else that of the result folder whose map it
+/// is (map.ply, map.pcd, levels/map_10mm.ply, components/NAME/map.ply).
+cloud::CloudFrame frame_of_cloud(const std::filesystem::path& file, const cloud::CloudFrame& said);
+
+/// map.ply, or map.pcd if the pipeline wrote no PLY; with its frame.
 core::Result<cloud::CloudFile> read_result_cloud(const ResultFolder& result);
 
 /// Segments of lines.ply.

@@ -67,6 +67,8 @@ class StoredRun {
   /// no clouds; those of filters.
   [[nodiscard]] core::Result<cloud::FusedCloud> fused(const cloud::DenseFusionOptions& options,
                                                       const core::Executor& executor) const;
+  /// The frame of `fused` and of the clouds of keyframes.
+  [[nodiscard]] cloud::CloudFrame frame() const;
   /// The cloud of each keyframe as FOLDER/<number, six digits>.ply; makes the folder. Returns how many.
   /// Errors (kOutput), (kInput): damaged.
   [[nodiscard]] core::Result<std::size_t> write_keyframe_clouds(const std::filesystem::path& folder) const;

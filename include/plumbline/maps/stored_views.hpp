@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "plumbline/cloud/io/frame.hpp"
 #include "plumbline/maps/camera_history.hpp"
 #include "plumbline/maps/store.hpp"
 
@@ -52,10 +53,10 @@ core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& ma
                                    const std::vector<RobotInfo>& robots, const Arrivals& arrivals = {},
                                    const RobotNumbers& numbers = {});
 
-/// The cloud of each keyframe as FOLDER/<number, six digits>.ply, transformed by `output_from_map`; makes the
-/// folder. `read`: a view's cloud. Returns how many. Errors (kOutput), those of `read`.
+/// The cloud of each keyframe as FOLDER/<number, six digits>.ply, transformed by `output_from_map` into
+/// `frame`; makes the folder. `read`: a view's cloud. Returns how many. Errors (kOutput), those of `read`.
 core::Result<std::size_t> write_keyframe_clouds(
     const std::filesystem::path& folder, const StoredViews& views, const geometry::Rigid3& output_from_map,
-    const std::function<core::Result<cloud::CloudPtr>(std::size_t)>& read);
+    const cloud::CloudFrame& frame, const std::function<core::Result<cloud::CloudPtr>(std::size_t)>& read);
 
 }  // namespace plumbline::maps

@@ -12,6 +12,7 @@
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/evaluate/cloud.hpp"
 #include "plumbline/evaluate/companions.hpp"
+#include "plumbline/maps/result_folder.hpp"
 
 namespace plumbline::cli {
 namespace {
@@ -55,34 +56,47 @@ core::Result<std::vector<evaluate::TrajectoryPair>> read_pairs(const CloudReques
   return pairs;
 }
 
-/// The cloud by its distance to the truth and, if that was sampled, the truth by its distance to the cloud;
-/// `shift`: of the reference.
-core::Result<void> write_error_clouds(const evaluate::SurfaceSamples& cloud, const Eigen::Vector3d& shift,
+/// Up in the reference's frame: as that is known; or as the cloud has it, which lies in this frame now, if no
+/// camera's path tells it either.
+std::optional<Eigen::Vector3d> up_of(const evaluate::Reference& reference, const cloud::CloudFrame& of_cloud,
+                                     const geometry::Rigid3& reference_from_cloud, bool cameras) {
+  if (reference.frame.up() == cloud::Up::kZ) return Eigen::Vector3d::UnitZ();
+  if (cameras || reference.frame.up() != cloud::Up::kUnknown || of_cloud.up() != cloud::Up::kZ)
+    return std::nullopt;
+  return Eigen::Vector3d(reference_from_cloud.rotation.col(2));
+}
+
+/// The cloud by its distance to the truth and, if that was sampled, the truth by its distance to the cloud.
+core::Result<void> write_error_clouds(const evaluate::SurfaceSamples& cloud,
+                                      const evaluate::Reference& reference,
                                       const evaluate::CloudReport& report,
                                       const std::vector<evaluate::TrajectoryPair>& pairs,
                                       const fs::path& folder) {
-  std::vector<geometry::Trajectory> cameras;
-  cameras.reserve(pairs.size());
-  for (const evaluate::TrajectoryPair& pair : pairs) cameras.push_back(pair.truth);
-  for (geometry::Trajectory& camera : cameras) {
+  const Eigen::Vector3d& shift = reference.shift;
+  geometry::Rigid3 placed = report.alignment.reference_from_cloud;  // of the files' coordinates
+  ErrorView view;
+  view.up = up_of(reference, cloud.frame, placed, !pairs.empty());
+  for (const evaluate::TrajectoryPair& pair : pairs) view.cameras.push_back(pair.truth);
+  for (geometry::Trajectory& camera : view.cameras) {
     for (geometry::StampedPose& pose : camera) pose.world_from_camera.translation -= shift;
   }
 
   evaluate::SurfaceSamples moved = cloud;
-  geometry::Rigid3 placed = report.alignment.reference_from_cloud;  // of the files' coordinates
   placed.translation += placed.rotation * cloud.shift - shift;
   evaluate::move(placed, moved);
   moved.shift = shift;
+  if (report.alignment.align != evaluate::CloudAlignment::kNone || reference.frame.known())
+    moved.frame = reference.frame;
 
-  if (auto done = write_error_cloud(folder / "accuracy", "Distance of the cloud to the true surface", moved,
-                                    report.error_m, cameras);
+  if (auto done = write_error_cloud(folder / "accuracy", "Distance of the cloud to the reference", moved,
+                                    report.error_m, view);
       !done) {
     return done;
   }
 
-  return write_error_cloud(folder / "completeness", "Distance of the true surface to the cloud",
-                           {report.reference_samples, report.reference_normals, {}, shift},
-                           report.reference_error_m, cameras);
+  return write_error_cloud(folder / "completeness", "Distance of the reference to the cloud",
+                           {report.reference_samples, report.reference_normals, {}, shift, moved.frame},
+                           report.reference_error_m, view);
 }
 
 core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
@@ -96,13 +110,16 @@ core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
   }
 
   const fs::path cloud_file = file_in(request.cloud, "map.ply");
-  const auto cloud = evaluate::load_cloud(cloud_file);
+  auto cloud = evaluate::load_cloud(cloud_file);
   if (!cloud) return tl::unexpected<core::Error>(cloud.error());
+  cloud->frame = maps::frame_of_cloud(cloud_file, cloud->frame);
 
   core::Result<evaluate::Reference> reference;
   if (!request.reference.empty()) {
-    reference = evaluate::load_reference(file_in(request.reference, "reference.ply"));
+    const fs::path file = file_in(request.reference, "reference.ply");
+    reference = evaluate::load_reference(file);
     if (!reference) return tl::unexpected<core::Error>(reference.error());
+    reference->frame = maps::frame_of_cloud(file, reference->frame);
   }
 
   std::vector<evaluate::TrajectoryPair> pairs;
@@ -129,7 +146,7 @@ core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
 
   fmt::print("{}", request.json ? evaluate::to_json(*report) : evaluate::to_text(*report));
   if (!request.output.empty()) {
-    auto done = write_error_clouds(*cloud, reference->shift, *report, pairs, request.output);
+    auto done = write_error_clouds(*cloud, *reference, *report, pairs, request.output);
     if (!done) return done;
   }
   if (!report->alignment.failed) return {};

@@ -15,6 +15,7 @@
 #include "plumbline/cloud/filters/filter_plugin.hpp"
 #include "plumbline/core/text.hpp"
 #include "plumbline/maps/output_check.hpp"
+#include "plumbline/maps/result_folder.hpp"
 
 namespace plumbline::cli {
 namespace {
@@ -65,18 +66,24 @@ core::Result<void> check_outputs(const FilterRequest& request, const cloud::Filt
 
 /// The inputs one after the other, in the frame of the first.
 core::Result<cloud::CloudPtr> read_inputs(const FilterRequest& request, cloud::CloudColumns& columns,
-                                          Eigen::Vector3d& shift) {
+                                          Eigen::Vector3d& shift, cloud::CloudFrame& frame) {
   cloud::CloudPtr all;
   for (std::size_t i = 0; i + 1 < request.files.size(); ++i) {
     auto file = cloud::read_cloud(request.files[i], cloud::LargeCoordinates::kShifted);
     if (!file) return tl::unexpected<core::Error>(file.error());
+    file->frame = maps::frame_of_cloud(request.files[i], file->frame);
+
     if (all == nullptr) {
       all = std::move(file->cloud);
       columns = std::move(file->columns);
       shift = file->shift;
+      frame = std::move(file->frame);
     } else {
       auto fits = cloud::check_one_frame(request.files.front().string(), shift, request.files[i].string(),
                                          file->shift);
+      if (fits)
+        fits = cloud::check_same_up(request.files.front().string(), frame, request.files[i].string(),
+                                    file->frame);
       if (!fits) return tl::unexpected<core::Error>(fits.error());
       cloud::change_shift(*file->cloud, file->shift, shift);
       cloud::append_columns(columns, all->size(), file->columns, file->cloud->size());
@@ -113,10 +120,12 @@ core::Result<void> filter(const FilterRequest& request, Session& session) {
   if (auto fit = chain->ready(context); !fit) return fit;
 
   cloud::CloudColumns columns;
-  auto input = read_inputs(request, columns, context.shift);
+  cloud::CloudFrame frame;
+  auto input = read_inputs(request, columns, context.shift, frame);
   if (!input) return tl::unexpected<core::Error>(input.error());
   context.columns = &columns;
   context.made_columns = &columns;
+  context.frame = &frame;
 
   Console& console = session.console();
   std::vector<cloud::FilterReport> reports;
@@ -130,7 +139,8 @@ core::Result<void> filter(const FilterRequest& request, Session& session) {
   if (!filtered) return tl::unexpected<core::Error>(filtered.error());
   if (!session.quiet) fmt::print("{}", cloud::to_table(reports));
   if (!session.quiet && !context.shift.isZero(0.0)) fmt::print("shift: {}\n", shift_text(context.shift));
-  if (auto written = cloud::write_cloud(output, **filtered, columns, context.shift); !written) return written;
+  auto written = cloud::write_cloud(output, **filtered, columns, context.shift, frame.comments());
+  if (!written) return written;
 
   return something_left(*chain, reports);
 }

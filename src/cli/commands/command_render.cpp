@@ -20,6 +20,7 @@
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/maps/output_check.hpp"
 #include "plumbline/maps/output_folder.hpp"
+#include "plumbline/maps/result_folder.hpp"
 #include "plumbline/maps/stored_run.hpp"
 #include "plumbline/viz/snapshot.hpp"
 #include "plumbline/viz/turntable.hpp"
@@ -212,6 +213,8 @@ core::Result<void> render(RenderRequest& request, Session& session) {
 
   const fs::path colours = cloud_file || !place->result ? request.input : place->result->ply();
   if (auto added = add_scalars(*file, colours, request.options.color, scene); !added) return added;
+  const cloud::CloudFrame frame = cloud_file ? maps::frame_of_cloud(request.input, file->frame) : file->frame;
+  if (frame.up() == cloud::Up::kZ) request.options.up = Eigen::Vector3d::UnitZ();
   if (request.turntable > 0) return turn(request, scene, session.console());
 
   return viz::render_snapshot(scene, request.options, request.output);

@@ -29,6 +29,10 @@ class MergeFilter : public Filter {
     if (!other) return tl::unexpected<core::Error>(other.error());
     const auto fits = check_one_frame("the chain's cloud", context.shift, file_, other->shift);
     if (!fits) return tl::unexpected<core::Error>(fits.error());
+    if (context.frame != nullptr) {
+      const auto same = check_same_up("the chain's cloud", *context.frame, file_, other->frame);
+      if (!same) return tl::unexpected<core::Error>(same.error());
+    }
     change_shift(*other->cloud, other->shift, context.shift);
     auto output = like(*input);
     output->points.reserve(input->size() + other->cloud->size());
@@ -79,8 +83,9 @@ class TeeFilter : public Filter {
       file.replace_filename(file.stem().string() + "_" + context.run + file.extension().string());
     }
     const CloudColumns none;
-    if (auto written =
-            write_cloud(file, *input, context.columns != nullptr ? *context.columns : none, context.shift);
+    const CloudFrame frame = context.frame != nullptr ? *context.frame : CloudFrame();
+    if (auto written = write_cloud(file, *input, context.columns != nullptr ? *context.columns : none,
+                                   context.shift, frame.comments());
         !written)
       return tl::unexpected<core::Error>(written.error());
     return std::make_shared<Cloud>(*input);

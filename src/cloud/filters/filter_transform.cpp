@@ -2,9 +2,23 @@
 #include <pcl/common/transforms.h>
 
 #include "filters/filter_tools.hpp"
+#include "plumbline/cloud/io/frame.hpp"
 
 namespace plumbline::cloud {
 namespace {
+
+/// The frame after the motion: only what is up in it is known, if it is one of the two directions with a
+/// name.
+CloudFrame moved_frame(const CloudFrame& frame, const Eigen::Matrix3d& rotation) {
+  constexpr double kSame = 1e-6;
+  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d minus_y = -Eigen::Vector3d::UnitY();
+  if (frame.up() == Up::kUnknown) return {};
+
+  const Eigen::Vector3d up = rotation * (frame.up() == Up::kZ ? z : minus_y);
+  if ((up - z).norm() < kSame) return frame_with(Up::kZ);
+  return frame_with((up - minus_y).norm() < kSame ? Up::kMinusY : Up::kUnknown);
+}
 
 class TransformFilter : public Filter {
  public:
@@ -14,13 +28,15 @@ class TransformFilter : public Filter {
                   "Roll, pitch, yaw: about x first, then y, then z of the fixed frame");
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
-    if (input->empty()) return like(*input);
     Eigen::Isometry3d transform = Eigen::Isometry3d::Identity();
     transform.linear() = (Eigen::AngleAxisd(rotation_rad_[2], Eigen::Vector3d::UnitZ()) *
                           Eigen::AngleAxisd(rotation_rad_[1], Eigen::Vector3d::UnitY()) *
                           Eigen::AngleAxisd(rotation_rad_[0], Eigen::Vector3d::UnitX()))
                              .toRotationMatrix();
     transform.translation() << translation_m_[0], translation_m_[1], translation_m_[2];
+    if (context.frame != nullptr) *context.frame = moved_frame(*context.frame, transform.linear());
+    if (input->empty()) return like(*input);
+
     transform.translation() += transform.linear() * context.shift - context.shift;
     auto output = std::make_shared<Cloud>();
     pcl::transformPointCloudWithNormals(*input, *output, transform.matrix().cast<float>().eval());
@@ -42,7 +58,8 @@ class TransformFilter : public Filter {
 FilterInfo transform_filter() {
   return {"transform", "Moves the cloud, its normals and its viewpoint.",
           "PCL's transformPointCloudWithNormals; an organised cloud stays organised. A viewpoint given by "
-          "the run does not move with it.",
+          "the run does not move with it. What a file's header says is up is turned with "
+          "it, and lost if neither z nor -y is up then.",
           "- type: transform\n  rotation: [-90 deg, 0 deg, 0 deg]\n  translation: [0 m, 0 m, 1.2 m]\n",
           [] { return std::make_unique<TransformFilter>(); }};
 }

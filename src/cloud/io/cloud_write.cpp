@@ -81,7 +81,8 @@ core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& clo
 }
 
 core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& cloud,
-                             const CloudColumns& columns, const Eigen::Vector3d& shift) {
+                             const CloudColumns& columns, const Eigen::Vector3d& shift,
+                             const std::vector<std::string>& comments) {
   check_columns(cloud, columns);
   const bool organised = cloud.height > 1;
   const std::size_t points = organised ? cloud.size() : count_finite(cloud);
@@ -110,8 +111,10 @@ core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& clo
     return shift[k] == 0.0 ? fmt::format("{}", t[k]) : fmt::format("{}", with_shift(t[k], shift[k]));
   };
 
+  out.write("# .PCD v0.7 - Point Cloud Data file format\n");
+  for (const std::string& comment : comments) out.write("# " + comment + "\n");
   out.write(fmt::format(
-      "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS {}\nSIZE {}\nTYPE {}\n"
+      "VERSION 0.7\nFIELDS {}\nSIZE {}\nTYPE {}\n"
       "COUNT {}\nWIDTH {}\nHEIGHT {}\nVIEWPOINT {} {} {} {} {} {} {}\nPOINTS {}\nDATA binary\n",
       fields, sizes, types, counts, organised ? cloud.width : points, organised ? cloud.height : 1, origin(0),
       origin(1), origin(2), q.w(), q.x(), q.y(), q.z(), points));
@@ -130,10 +133,11 @@ core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& clo
 }
 
 core::Result<void> write_cloud(const std::filesystem::path& file, const Cloud& cloud,
-                               const CloudColumns& columns, const Eigen::Vector3d& shift) {
+                               const CloudColumns& columns, const Eigen::Vector3d& shift,
+                               const std::vector<std::string>& comments) {
   const std::string ending = core::ending_of(file);
-  if (ending == ".ply") return write_ply(file, cloud, columns, shift);
-  if (ending == ".pcd") return write_pcd(file, cloud, columns, shift);
+  if (ending == ".ply") return write_ply(file, cloud, columns, shift, comments);
+  if (ending == ".pcd") return write_pcd(file, cloud, columns, shift, comments);
   return core::usage_error(fmt::format(
       "{}: ending '{}' is not one that clouds are written as; use .ply or .pcd", file.string(), ending));
 }

@@ -36,6 +36,7 @@ struct PcdHeader {
   std::uint64_t record = 0;    ///< bytes of one point
   std::uint64_t elements = 0;  ///< numbers of one point
   std::vector<double> viewpoint;
+  std::vector<std::string> comments;
   std::string data;
 };
 
@@ -141,7 +142,14 @@ core::Result<PcdHeader> read_header(ByteReader& reader) {
   for (int number = 1; number < 100 && reader.line(line, 65536); ++number) {
     std::istringstream words(line);
     std::string key;
-    if (!(words >> key) || key[0] == '#') continue;
+    if (!(words >> key)) continue;
+
+    if (key[0] == '#') {
+      const std::size_t text = line.find_first_not_of("# ");
+      if (text != std::string::npos) header.comments.push_back(line.substr(text));
+      continue;
+    }
+
     std::string problem = parse_line(key, words, header);
     if (problem.empty() && key == "DATA") problem = finish_fields(header);
     if (!problem.empty()) return core::input_error(fmt::format("line {}: {}", number, problem));
@@ -349,6 +357,7 @@ core::Result<CloudFile> read_pcd_cloud(const std::filesystem::path& file, LargeC
                 static_cast<std::uint32_t>(organised ? header->height : 1));
 
   CloudFile result = builder.finish();
+  result.frame = frame_in(header->comments);
   if (const auto& v = header->viewpoint; v.size() == 7) {
     result.cloud->sensor_origin_ =
         (Eigen::Vector4d(v[0], v[1], v[2], 0.0) -

@@ -72,6 +72,7 @@ core::Result<Reference> load_reference(const std::filesystem::path& file) {
     if (!samples) return tl::unexpected(samples.error());
     if (const auto ok = check_reference(file, samples->points); !ok) return tl::unexpected(ok.error());
     reference.shift = samples->shift;
+    reference.frame = samples->frame;
     reference.samples = std::move(*samples);
     return reference;
   }
@@ -87,12 +88,14 @@ core::Result<Reference> load_reference(const std::filesystem::path& file) {
   if (const auto ok = check_reference(file, points); !ok) return tl::unexpected(ok.error());
 
   reference.shift = Eigen::Map<const Eigen::Vector3d>(ply->shift.data());
+  reference.frame = cloud::frame_in(ply->comments);
   if (!ply->triangles.empty()) {
     reference.mesh = {std::move(points), ply->triangles, visibility(*ply)};
     return reference;
   }
 
-  reference.samples = {std::move(points), vectors(*ply, "nx", "ny", "nz"), visibility(*ply), reference.shift};
+  reference.samples = {std::move(points), vectors(*ply, "nx", "ny", "nz"), visibility(*ply), reference.shift,
+                       reference.frame};
   tidy_normals(reference.samples.normals);
   return reference;
 }
@@ -104,6 +107,7 @@ core::Result<SurfaceSamples> load_cloud(const std::filesystem::path& file) {
     return core::input_error(fmt::format("{}: the cloud has no points", file.string()));
   SurfaceSamples samples = samples_of(*read->cloud);
   samples.shift = read->shift;
+  samples.frame = read->frame;
   return samples;
 }
 

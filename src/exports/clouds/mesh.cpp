@@ -12,7 +12,8 @@ namespace {
 core::Result<ExportSummary> write_mesh_file(MapSource& source, const std::filesystem::path& output) {
   auto mesh = mesh_of(source);
   if (!mesh) return tl::unexpected(mesh.error());
-  mesh->comments = {"plumbline, metres", source.frame_text()};
+  mesh->comments = {"plumbline, metres"};
+  for (std::string& comment : source.frame().comments()) mesh->comments.push_back(std::move(comment));
   if (auto written = cloud::write_mesh(output, *mesh); !written) return tl::unexpected(written.error());
   ExportSummary summary;
   summary.written = {output};

@@ -13,15 +13,17 @@ namespace {
 
 /// Writes PCD as text, in which a colour is one number.
 core::Result<void> write_ascii_pcd(const std::filesystem::path& output, const cloud::CloudFile& file,
-                                   const std::string& frame) {
+                                   const std::vector<std::string>& comments) {
   core::OutputFile out(output);
   const std::size_t points = file.cloud->size();
+  out.write("# .PCD v0.7 - Point Cloud Data file format\n");
+  for (const std::string& comment : comments) out.write("# " + comment + "\n");
   out.write(
-      fmt::format("# .PCD v0.7 - Point Cloud Data file format\n# {}\nVERSION 0.7\n"
+      fmt::format("VERSION 0.7\n"
                   "FIELDS x y z rgb normal_x normal_y normal_z\nSIZE {}\nTYPE F F F U F F F\n"
                   "COUNT 1 1 1 1 1 1 1\nWIDTH {}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {}\n"
                   "DATA ascii\n",
-                  frame, file.shift.isZero(0.0) ? "4 4 4 4 4 4 4" : "8 8 8 4 4 4 4", points, points));
+                  file.shift.isZero(0.0) ? "4 4 4 4 4 4 4" : "8 8 8 4 4 4 4", points, points));
   for (const cloud::Point& p : *file.cloud) {
     const unsigned color = (unsigned{p.r} << 16U) | (unsigned{p.g} << 8U) | unsigned{p.b};
     const Eigen::Vector3d at = p.getVector3fMap().cast<double>() + file.shift;
@@ -35,8 +37,10 @@ core::Result<ExportSummary> write_pcd_cloud(MapSource& source, const std::filesy
   const auto cloud = source.cloud();
   if (!cloud) return tl::unexpected(cloud.error());
   const cloud::CloudFile& file = **cloud;
-  auto written = source.options().ascii ? write_ascii_pcd(output, file, source.frame_text())
-                                        : cloud::write_pcd(output, *file.cloud, file.columns, file.shift);
+  const std::vector<std::string> comments = source.frame().comments();
+  auto written = source.options().ascii
+                     ? write_ascii_pcd(output, file, comments)
+                     : cloud::write_pcd(output, *file.cloud, file.columns, file.shift, comments);
   if (!written) return tl::unexpected(written.error());
   ExportSummary summary;
   summary.written = {output};

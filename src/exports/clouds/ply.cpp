@@ -44,8 +44,8 @@ core::Result<ExportSummary> write_ply_cloud(MapSource& source, const std::filesy
     comments = {fmt::format("frame: {} (EPSG:{}); x east, y north, z up, metres", (*reference)->name,
                             (*reference)->epsg)};
     summary.notes.push_back(fmt::format("in {} (EPSG:{})", (*reference)->name, (*reference)->epsg));
-  } else if (source.options().ascii) {
-    comments = {source.frame_text()};
+  } else {
+    comments = source.frame().comments();
   }
 
   const cloud::CloudFile file = *reference ? to_world(**cloud, **reference) : **cloud;

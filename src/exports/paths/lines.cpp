@@ -29,7 +29,8 @@ core::Result<ExportSummary> write_lines(MapSource& source, const std::filesystem
   for (const auto& [start, end] : *lines) {
     if (source.selects(start) && source.selects(end)) chosen.emplace_back(start, end);
   }
-  if (auto written = maps::write_lines_ply(output, chosen); !written) return tl::unexpected(written.error());
+  if (auto written = maps::write_lines_ply(output, chosen, {}, source.frame().comments()); !written)
+    return tl::unexpected(written.error());
   ExportSummary summary;
   summary.written = {output};
   return summary;

@@ -123,7 +123,9 @@ core::Result<std::vector<ModelPoint>> landmark_points(MapSource& source,
   }
 
   const auto cloud = source.cloud();
-  const ColorCells colors(cloud ? **cloud : cloud::CloudFile{std::make_shared<cloud::Cloud>(), {}});
+  cloud::CloudFile none;
+  none.cloud = std::make_shared<cloud::Cloud>();
+  const ColorCells colors(cloud ? **cloud : none);
   std::vector<ModelPoint> points;
   for (const core::PointId id : map.point_ids()) {
     const maps::MapPoint& landmark = map.point(id);

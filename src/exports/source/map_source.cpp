@@ -132,13 +132,20 @@ core::Result<MapSource> MapSource::open(const ExportRequest& request, const core
   source.log_ = &log;
   source.progress_ = &progress;
   source.cloud_only_ = is_cloud_file(request.input);
-  if (source.cloud_only_) {
-    source.upright_ = true;  // as far as is known
-  } else if (auto opened = source.open_map(); !opened) {
-    return tl::unexpected(opened.error());
-  }
+  const auto opened = source.cloud_only_ ? source.open_cloud() : source.open_map();
+  if (!opened) return tl::unexpected(opened.error());
+  if (!source.cloud_only_) source.name_frame();
   if (auto selected = source.select(); !selected) return tl::unexpected(selected.error());
   return source;
+}
+
+/// A cloud is read at once, because its file says what is up; if it does not, z is taken for it.
+core::Result<void> MapSource::open_cloud() {
+  const auto whole = whole_cloud();
+  if (!whole) return tl::unexpected(whole.error());
+  frame_ = maps::frame_of_cloud(request_->input, (*whole)->frame);
+  upright_ = frame_.up() != cloud::Up::kMinusY;
+  return {};
 }
 
 core::Result<void> MapSource::open_map() {
@@ -269,14 +276,18 @@ core::Result<const maps::StoredRun*> MapSource::store(const std::string& what) c
 core::Result<void> MapSource::need_upright(const std::string& what) const {
   if (upright_) return {};
   return core::input_error(
-      fmt::format("{}: the map is not upright, so that heights over the floor are not known; map again "
-                  "without fuse.up=none",
-                  what));
+      fmt::format("{}: the {} is not upright, so that heights over the floor are not known; {}", what,
+                  cloud_only_ ? "cloud" : "map",
+                  cloud_only_ ? "turn it with the filter transform" : "map again without fuse.up=none"));
+}
+
+void MapSource::name_frame() {
+  frame_.text = upright_ ? "the map's; metres, right-handed, z up, z = 0 on the floor"
+                         : "the map's; metres, right-handed, that of its first camera (z ahead, y down)";
 }
 
 std::string MapSource::frame_text() const {
-  return upright_ ? "frame: the map's; metres, right-handed, z up, z = 0 on the floor"
-                  : "frame: the map's; metres, right-handed, that of its first camera (z ahead, y down)";
+  return frame_.known() ? frame_.comments().front() : "frame: the cloud's; its file does not say what is up";
 }
 
 core::Result<cloud::CloudFile> MapSource::read_cloud() const {

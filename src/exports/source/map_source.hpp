@@ -49,6 +49,8 @@ class MapSource {
   [[nodiscard]] const geometry::Rigid3& world_from_map() const { return world_from_map_; }
   /// Checks that z is up. Errors (kInput): it is not, with advice; `what` is the export that needs it.
   [[nodiscard]] core::Result<void> need_upright(const std::string& what) const;
+  /// The frame of all that is exported; nothing for a cloud whose file says nothing.
+  [[nodiscard]] const cloud::CloudFrame& frame() const { return frame_; }
   /// Description of the frame, one line, for files that hold text.
   [[nodiscard]] std::string frame_text() const;
 
@@ -68,7 +70,9 @@ class MapSource {
 
  private:
   MapSource() = default;
+  core::Result<void> open_cloud();
   core::Result<void> open_map();
+  void name_frame();
   core::Result<void> level_interrupted();
   core::Result<void> select();
   core::Result<cloud::CloudFile> read_cloud() const;
@@ -86,6 +90,7 @@ class MapSource {
   std::vector<maps::RobotInfo> robots_;
   geometry::Rigid3 world_from_map_;
   bool upright_ = false;
+  cloud::CloudFrame frame_;
   std::optional<cloud::CloudFile> whole_;
   double whole_voxel_m_ = 0.0;  ///< voxel size of the whole cloud; 0: that of the run
   std::optional<cloud::CloudFile> chosen_;

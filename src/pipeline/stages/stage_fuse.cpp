@@ -121,8 +121,9 @@ class FuseStage : public Stage {
     if (dense->upright) cloud::transform(*fused->cloud, report.frame.output_from_map);
 
     if (keyframe_clouds_ && map.name.empty()) {
+      const auto up = dense->upright ? cloud::Up::kZ : cloud::Up::kMinusY;
       const auto written = maps::write_keyframe_clouds(context_->output_folder / "keyframes", *views,
-                                                       report.frame.output_from_map,
+                                                       report.frame.output_from_map, cloud::frame_with(up),
                                                        [&](std::size_t i) { return read(*views, i); });
       if (!written) return tl::unexpected(written.error());
     }

@@ -71,7 +71,9 @@ class CloudTap : public Tap {
   CloudTap() : Tap(Count::kOne, {".ply", ".pcd"}) {}
   core::Result<void> finish(StageIo& io) override {
     const auto dense = io.input<DenseCloud>("in");
-    return cloud::write_cloud(path(), *dense->cloud, dense->columns);
+    const auto up = dense->upright ? cloud::Up::kZ : cloud::Up::kMinusY;
+    return cloud::write_cloud(path(), *dense->cloud, dense->columns, Eigen::Vector3d::Zero(),
+                              cloud::frame_with(up).comments());
   }
 };
 

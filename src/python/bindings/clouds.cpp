@@ -13,6 +13,7 @@
 #include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/core/config.hpp"
 #include "plumbline/core/executor.hpp"
+#include "plumbline/maps/result_folder.hpp"
 
 namespace plumbline::python {
 namespace {
@@ -22,6 +23,7 @@ struct PointCloud {
   cloud::CloudPtr cloud;
   cloud::CloudColumns columns;
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();
+  cloud::CloudFrame frame = {};
 };
 using PointCloudPtr = std::shared_ptr<PointCloud>;
 
@@ -146,12 +148,13 @@ PointCloudPtr make_cloud(const FloatArray& points, const std::optional<ByteArray
 PointCloudPtr read_cloud(const std::filesystem::path& file) {
   const py::gil_scoped_release free;
   cloud::CloudFile read = value_of(cloud::read_cloud(file, cloud::LargeCoordinates::kShifted));
-  return std::make_shared<PointCloud>(PointCloud{std::move(read.cloud), std::move(read.columns), read.shift});
+  return std::make_shared<PointCloud>(PointCloud{std::move(read.cloud), std::move(read.columns), read.shift,
+                                                 maps::frame_of_cloud(file, read.frame)});
 }
 
 void write_cloud(const PointCloudPtr& self, const std::filesystem::path& file) {
   const py::gil_scoped_release free;
-  value_of(cloud::write_cloud(file, *self->cloud, self->columns, self->shift));
+  value_of(cloud::write_cloud(file, *self->cloud, self->columns, self->shift, self->frame.comments()));
 }
 
 /// A chain's file or name, or, with `yaml`, the text of one.
@@ -183,8 +186,10 @@ py::tuple filter(const PointCloudPtr& self, const std::string& chain, bool yaml,
 
     context.executor = &executor;
     context.shift = result->shift = self->shift;
+    result->frame = self->frame;
     context.columns = &self->columns;
     context.made_columns = &made;
+    context.frame = &result->frame;
     value_of(loaded.ready(context));
     result->cloud = value_of(loaded.apply(self->cloud, context, &reports));
     result->columns = std::move(made);

@@ -117,16 +117,20 @@ py::tuple write_export(const fs::path& input, const fs::path& output, const std:
   return py::make_tuple(summary.written, summary.notes);
 }
 
-/// A result's cloud, paths and, if wanted, lines.
-viz::Scene scene_of(const fs::path& input, bool lines) {
+/// A result's cloud, paths and, if wanted, lines; `frame`: theirs.
+viz::Scene scene_of(const fs::path& input, bool lines, cloud::CloudFrame& frame) {
   viz::Scene scene;
   if (fs::is_regular_file(input) && input.extension() != ".db") {
-    scene.cloud = value_of(cloud::read_cloud(input, cloud::LargeCoordinates::kShifted)).cloud;
+    const cloud::CloudFile file = value_of(cloud::read_cloud(input, cloud::LargeCoordinates::kShifted));
+    scene.cloud = file.cloud;
+    frame = maps::frame_of_cloud(input, file.frame);
     return scene;
   }
 
   const maps::MapPlace place = value_of(maps::find_map(input));
-  scene.cloud = value_of(maps::read_map_cloud(place, core::Executor(1))).cloud;
+  const cloud::CloudFile file = value_of(maps::read_map_cloud(place, core::Executor(1)));
+  scene.cloud = file.cloud;
+  frame = file.frame;
   if (!place.result) return scene;
   for (const fs::path& folder : place.result->robot_folders())
     scene.paths.emplace_back().trajectory = value_of(dataset::read_trajectory(folder / "trajectory.txt"));
@@ -144,8 +148,10 @@ py::array render(const fs::path& input, const std::string& title, bool lines, co
   cv::Mat image;
   {
     const py::gil_scoped_release free;
-    viz::Scene scene = scene_of(input, lines);
+    cloud::CloudFrame frame;
+    viz::Scene scene = scene_of(input, lines, frame);
     scene.title = title;
+    if (frame.up() == cloud::Up::kZ) options.up = Eigen::Vector3d::UnitZ();
     value_of(viz::render_snapshot(scene, options, picture));
     image = value_of(dataset::read_image(picture));
   }

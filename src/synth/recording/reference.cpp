@@ -196,7 +196,8 @@ core::Result<ReferenceCounts> write_reference(const std::filesystem::path& file,
   std::ofstream out(file, std::ios::binary);
   out << fmt::format(
       "ply\nformat binary_little_endian 1.0\ncomment samples of the true surfaces, {:.4f} m apart; visible = "
-      "1 where a camera saw the spot within range\nelement vertex {}\n",
+      "1 where a camera saw the spot within range\ncomment frame: of the scene; metres, right-handed, z up\n"
+      "element vertex {}\n",
       spacing, counts.samples);
 
   for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) out << "property float " << name << "\n";

@@ -20,6 +20,7 @@
 namespace plumbline::cloud {
 
 struct CloudColumns;
+struct CloudFrame;
 
 /// Additional knowledge that a filter may use.
 struct FilterContext {
@@ -30,6 +31,9 @@ struct FilterContext {
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();
   /// Distance of neighbouring points, metres, if it is known (the voxel of a fused cloud); 0: unknown.
   double spacing_m = 0.0;
+  /// The frame of the input, as far as it is known; a filter that moves points changes it. Null:
+  /// nothing, and nobody asks.
+  CloudFrame* frame = nullptr;
   std::uint32_t seed = 0;  ///< seed of random choices
   /// Threads for the filters that can use several; without it one. Results do not depend on it.
   const core::Executor* executor = nullptr;

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "plumbline/cloud/io/frame.hpp"
 #include "plumbline/cloud/types.hpp"
 #include "plumbline/core/error.hpp"
 
@@ -44,14 +45,17 @@ core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& clo
 
 /// Binary PCD v0.7: x y z rgb normal_x normal_y normal_z curvature [, confidence, observations, robot,
 /// others]. An organised cloud stays organised and keeps its NaN points; an unorganised one loses them.
+/// `comments`: lines for the header, each behind a #, which PCL passes over.
 core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& cloud,
                              const CloudColumns& columns = {},
-                             const Eigen::Vector3d& shift = Eigen::Vector3d::Zero());
+                             const Eigen::Vector3d& shift = Eigen::Vector3d::Zero(),
+                             const std::vector<std::string>& comments = {});
 
 /// write_ply or write_pcd by the name's ending; another ending is a kUsage error.
 core::Result<void> write_cloud(const std::filesystem::path& file, const Cloud& cloud,
                                const CloudColumns& columns = {},
-                               const Eigen::Vector3d& shift = Eigen::Vector3d::Zero());
+                               const Eigen::Vector3d& shift = Eigen::Vector3d::Zero(),
+                               const std::vector<std::string>& comments = {});
 
 struct CloudFile {
   CloudPtr cloud;  ///< without colour: 255 255 255; without normals: NaN normals
@@ -59,6 +63,7 @@ struct CloudFile {
   /// Subtracted from all positions while reading: a point is at `shift` + its coordinates. Zero without
   /// LargeCoordinates::kShifted.
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();
+  CloudFrame frame = {};  ///< as the file's header says
   bool has_color = false;
   bool has_normals = false;
   std::size_t nan_points = 0;   ///< points with a coordinate that is not finite; kept in `cloud`
