@@ -8,6 +8,8 @@
 #include <cctype>
 #include <string_view>
 
+#include "plumbline/core/text.hpp"
+
 namespace plumbline::core {
 namespace {
 
@@ -110,22 +112,23 @@ std::string to_string(const ConfigProblems& problems) {
     });
 
     for (const ConfigProblem* p : here) {
-      if (!text.empty()) text += '\n';
-      text += file;
-      if (p->mark.line > 0) text += fmt::format(":{}:{}", p->mark.line, p->mark.column);
+      std::string line = file;
+      if (p->mark.line > 0) line += fmt::format(":{}:{}", p->mark.line, p->mark.column);
 
       // "--set features.points: ..." is how the user wrote it; a file is followed by a colon.
       const bool command_line = file.rfind("--", 0) == 0;
-      if (!file.empty()) text += command_line ? " " : ": ";
-      if (!p->path.empty()) text += p->path + ": ";
-      text += p->what;
+      if (!file.empty()) line += command_line ? " " : ": ";
+      if (!p->path.empty()) line += p->path + ": ";
+      text += (text.empty() ? "" : "\n") + printable(line + p->what);
     }
   }
 
   return text;
 }
 
-Error to_error(const ConfigProblems& problems) { return {ErrorKind::kUsage, to_string(problems)}; }
+Error to_error(const ConfigProblems& problems) {
+  return {ErrorKind::kUsage, to_string(problems), problems.size() > 1};
+}
 
 std::string did_you_mean(const std::string& word, const std::vector<std::string>& candidates) {
   std::string near = nearest(word, candidates, [](const std::string& c) { return c; });

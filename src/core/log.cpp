@@ -4,6 +4,8 @@
 #include <spdlog/logger.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 
+#include "plumbline/core/text.hpp"
+
 namespace plumbline::core {
 namespace {
 
@@ -14,7 +16,7 @@ class StderrLog : public Log {
     logger_.set_level(level(threshold));
     logger_.set_pattern("plumbline: %^%l%$: %v");
   }
-  void write(LogLevel l, const std::string& message) override { logger_.log(level(l), message); }
+  void write(LogLevel l, const std::string& message) override { logger_.log(level(l), printable(message)); }
 
  private:
   static spdlog::level::level_enum level(LogLevel l) {

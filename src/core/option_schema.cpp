@@ -67,10 +67,12 @@ Json type_schema(const OptionSpec& spec) {
     case OptionType::kInteger:
     case OptionType::kNumber:
       return number_schema(spec);
-    case OptionType::kText:
-      return {{"type", Json::array({"string", "number",
-                                    "boolean"})}};  // an unquoted 12 is a text here, but not to JSON
-
+    case OptionType::kText: {
+      // an unquoted 12 is a text here, but not to JSON
+      Json text = {{"type", Json::array({"string", "number", "boolean"})}};
+      if (spec.empty == EmptyValue::kRefused) text["minLength"] = 1;
+      return text;
+    }
     case OptionType::kChoice:
       return {{"enum", words(spec.choices)}};
     case OptionType::kNumbers:
@@ -113,7 +115,7 @@ std::string allowed_text(const OptionSpec& spec) {
     case OptionType::kNumber:
       return range_text(spec.min, spec.max, spec.unit);
     case OptionType::kText:
-      return "text";
+      return spec.empty == EmptyValue::kAllowed ? "text, may be empty" : "text";
     case OptionType::kChoice:
       return fmt::format("{}", fmt::join(spec.choices, ", "));
     case OptionType::kNumbers:

@@ -9,6 +9,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "plumbline/core/option_schema.hpp"
 #include "units.hpp"
 
 namespace plumbline::core {
@@ -108,19 +109,22 @@ OptionTable& OptionTable::number(std::string key, double& value, Range<double> r
              {parse, print});
 }
 
-OptionTable& OptionTable::text(std::string key, std::string& value, std::string help) {
+OptionTable& OptionTable::text(std::string key, std::string& value, std::string help, EmptyValue empty) {
+  OptionSpec spec = spec_of(std::move(key), OptionType::kText, std::move(help));
+  spec.empty = empty;
   const auto parse = [&value](const ConfigNode& node) -> std::string {
     if (node.kind != Kind::kScalar) return describe(node) + " is not a text";
     value = node.scalar;
     return "";
   };
   const auto print = [&value]() { return text_as_yaml(value); };
-  return add(spec_of(std::move(key), OptionType::kText, std::move(help)), {parse, print});
+  return add(std::move(spec), {parse, print});
 }
 
 OptionTable& OptionTable::text_or_list(std::string key, ConfigNode& value, std::string list_of,
-                                       std::string help) {
+                                       std::string help, EmptyValue empty) {
   OptionSpec spec = spec_of(std::move(key), OptionType::kTextOrList, std::move(help));
+  spec.empty = empty;
   spec.list_of = list_of;
   const auto parse = [&value, list_of](const ConfigNode& node) -> std::string {
     if (node.kind != Kind::kScalar && node.kind != Kind::kSequence) {
@@ -176,6 +180,13 @@ void OptionTable::set(const std::string& key, const ConfigNode& value, const std
   const std::string full_path = joined_path(path, key);
   for (std::size_t i = 0; i < specs_.size(); ++i) {
     if (specs_[i].key != key) continue;
+    if (specs_[i].empty == EmptyValue::kRefused && value.kind == Kind::kScalar && value.scalar.empty()) {
+      problems.push_back(
+          {value.mark, full_path,
+           fmt::format("is empty; give a value or leave it out (allowed: {})", allowed_text(specs_[i]))});
+      return;
+    }
+
     std::string wrong = bindings_[i].parse(value);
     if (!wrong.empty() && specs_[i].type == OptionType::kChoice) {
       wrong = describe(value) + " is not one of the choices" + hint(value.scalar, specs_[i].choices);

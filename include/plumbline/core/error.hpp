@@ -16,11 +16,13 @@ enum class ErrorKind {
   kInput = 3,          ///< input data missing, unreadable or unusable
   kUntrustworthy = 4,  ///< done, but the result must not be trusted as it is
   kOutput = 5,         ///< output cannot be written, or memory, files or threads are short
+  kStopped = 130,  ///< stopped by the user before there was anything to write; 130, as shells say of Ctrl-C
 };
 
 struct Error {
   ErrorKind kind = ErrorKind::kInternal;
   std::string message;  ///< one line (several for configuration files): file, place, what is wrong, remedy
+  bool listed = false;  ///< the message has a line for each of several problems; names in it are printable
 };
 
 template <typename T>

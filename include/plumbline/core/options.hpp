@@ -29,12 +29,17 @@ struct Range {
   T max = std::numeric_limits<T>::max();
 };
 
+/// Options refuse an empty text, which mostly is a variable of a shell that was not set, unless it is
+/// allowed.
+enum class EmptyValue { kRefused, kAllowed };
+
 enum class OptionType { kBoolean, kInteger, kNumber, kText, kChoice, kNumbers, kTextOrList };
 
 /// Declaration of one option; values as text in the syntax that the parser accepts.
 struct OptionSpec {
   std::string key;
   OptionType type = OptionType::kText;
+  EmptyValue empty = EmptyValue::kRefused;
   std::string unit;  ///< unit of the stored value: "m", "s", "rad", "px", "" (none)
   std::string default_value;
   double min = std::numeric_limits<double>::lowest();
@@ -52,7 +57,9 @@ class OptionTable {
   OptionTable& integer(std::string key, int& value, Range<int> range, std::string unit, std::string help);
   OptionTable& number(std::string key, double& value, Range<double> range, std::string unit,
                       std::string help);
-  OptionTable& text(std::string key, std::string& value, std::string help);
+  /// With kAllowed, `help` says what an empty text means.
+  OptionTable& text(std::string key, std::string& value, std::string help,
+                    EmptyValue empty = EmptyValue::kRefused);
   OptionTable& choice(std::string key, std::string& value, std::vector<std::string> allowed,
                       std::string help);
   OptionTable& numbers(std::string key, std::vector<double>& value, std::size_t length, Range<double> range,
@@ -61,7 +68,8 @@ class OptionTable {
   OptionTable& choice(std::string key, Enum& value, std::vector<std::pair<std::string, Enum>> allowed,
                       std::string help);
   /// Name of a file, or the list that the file would contain. The owner reads the tree.
-  OptionTable& text_or_list(std::string key, ConfigNode& value, std::string list_of, std::string help);
+  OptionTable& text_or_list(std::string key, ConfigNode& value, std::string list_of, std::string help,
+                            EmptyValue empty = EmptyValue::kRefused);
 
   /// Reads one value; `path` is the dotted path of the map that holds the key. Numbers may carry a unit ("5
   /// mm", "10 deg", "0.5 s"), converted to the option's unit; booleans are true/false/on/off/yes/no. The

@@ -116,6 +116,30 @@ TEST(Options, RefusesWhatOnlyLooksLikeANumber) {
   EXPECT_EQ(read(s, "type: x\n", {"type"}), "");
 }
 
+TEST(Options, EmptyValuesAreRefusedUnlessTheyAreDeclared) {
+  Sample s;
+  for (const char* key : {"lines", "count", "leaf", "name", "view", "kernel", "steps"}) {
+    const std::string wrong = read(s, std::string(key) + ": ''");
+    EXPECT_NE(wrong.find("stages.s." + std::string(key) + ": is empty; give a value or leave it out"),
+              std::string::npos)
+        << wrong;
+  }
+  EXPECT_EQ(s.name, "a name");
+
+  std::string views = "iso";
+  OptionTable table;
+  table.text("views", views, "Views; empty: none", EmptyValue::kAllowed);
+  ConfigNode empty;
+  empty.kind = ConfigNode::Kind::kScalar;
+  ConfigProblems problems;
+  table.set("views", empty, "", problems);
+  EXPECT_TRUE(problems.empty());
+  EXPECT_EQ(views, "");
+  EXPECT_EQ(allowed_text(table.specs().front()), "text, may be empty");
+  EXPECT_FALSE(option_schema(table.specs().front()).contains("minLength"));
+  EXPECT_EQ(option_schema(s.table().specs()[7])["minLength"], 1);
+}
+
 TEST(Options, PrintedValuesReadBackTheSame) {
   Sample s;
   s.leaf_m = 1.0 / 3.0;
