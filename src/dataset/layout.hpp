@@ -109,10 +109,8 @@ std::string not_a_recording_file(const std::filesystem::path& file);
 bool is_folder(const std::filesystem::path& path);
 bool is_file(const std::filesystem::path& path);
 
-/// A JSON file of at most 64 MB; null if it cannot be read or is not JSON.
-nlohmann::json read_json_file(const std::filesystem::path& file);
 /// The number under that key; none if it is missing, not a number or not finite.
-std::optional<double> json_number(const nlohmann::json& object, const char* key);
+std::optional<double> json_number(const nlohmann::ordered_json& object, const char* key);
 
 /// world_from_camera from what Apple's ARKit calls the camera's transform: there y points up and the camera
 /// looks along -z, in the world as in the camera. Here the world's z points up.

@@ -182,6 +182,7 @@ core::Result<TrajectoryReading> recording_poses(const fs::path& folder, core::Lo
 
 core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder, const OpenOptions& options,
                                                           core::Log& log) {
+  if (folder.empty()) return core::usage_error("the path of the recording is empty");
   std::error_code ignored;
   if (!fs::exists(folder, ignored)) {
     return core::input_error(

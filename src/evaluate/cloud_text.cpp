@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "plumbline/core/json.hpp"
 #include "plumbline/evaluate/cloud.hpp"
 
 namespace plumbline::evaluate {
@@ -98,7 +99,7 @@ std::string to_json(const CloudReport& r) {
   }
 
   out["warnings"] = r.warnings;
-  return out.dump(2) + "\n";
+  return core::json_text(out);
 }
 
 std::string to_text(const CloudReport& r) {

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "plumbline/core/json.hpp"
 #include "plumbline/core/numbers.hpp"
 #include "plumbline/evaluate/trajectory.hpp"
 
@@ -135,7 +136,7 @@ core::Result<std::vector<double>> read_frame_stamps(const std::filesystem::path&
   return stamps;
 }
 
-std::string to_json(const TrajectoryReport& r) { return json_of(r).dump(2) + "\n"; }
+std::string to_json(const TrajectoryReport& r) { return core::json_text(json_of(r)); }
 
 std::string to_json(const std::vector<NamedReport>& reports) {
   Json estimates = Json::array();
@@ -144,7 +145,7 @@ std::string to_json(const std::vector<NamedReport>& reports) {
     one.update(json_of(named.report));
     estimates.push_back(std::move(one));
   }
-  return Json{{"estimates", std::move(estimates)}}.dump(2) + "\n";
+  return core::json_text(Json{{"estimates", std::move(estimates)}});
 }
 
 std::string to_text(const std::vector<NamedReport>& reports) {

@@ -50,6 +50,12 @@ FORBIDDEN = [
     (re.compile(r"\bstd::(rand|srand|random_device)\b|(?<![\w.>:])s?rand\s*\("),
      "random choices take a seed"),
 ]
+# What only one file may do, in the program as well: the file, what it alone may call, and what the others call.
+ALONE = [
+    ("src/core/json.cpp", re.compile(r"\b[Jj]son::(parse|sax_parse|accept)\b|>>\s*[jJ]son\b"),
+     "JSON is read by core::read_json and core::parse_json, which bound it"),
+    ("src/core/json.cpp", re.compile(r"\.dump\("), "JSON is written by core::json_text, which is valid for any name"),
+]
 PROGRAM = {"cli"}
 CODE = {".cpp", ".hpp", ".h", ".c"}
 SPDX = "SPDX-License-Identifier: BSD-3-Clause"
@@ -145,9 +151,12 @@ def check_code(root, module, reachable):
                 wrong = check_include(module, include.group(1), include.group(2), reachable)
                 if wrong:
                     problems.append(f"{where}: {wrong}")
-            elif module not in PROGRAM:
-                text = without_comment(line)
+                continue
+            text = without_comment(line)
+            if module not in PROGRAM:
                 problems += [f"{where}: {why}" for what, why in FORBIDDEN if what.search(text)]
+            problems += [f"{where}: {why}" for home, what, why in ALONE
+                         if what.search(text) and file != root / home]
     return problems
 
 

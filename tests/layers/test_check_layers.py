@@ -58,6 +58,14 @@ class CheckLayers(unittest.TestCase):
             self.write("src/core/a.cpp", "no licence\n")
             self.assertEqual(check_layers.main(self.root), 1)
 
+    def test_json_of_others_is_read_in_one_file(self):
+        for call in ("auto v = Json::parse(stream);", "nlohmann::json::accept(text);", "stream >> json;"):
+            self.assert_found("core::read_json", call, "src/cli/a.cpp")
+        self.assert_found("core::json_text", "print(json.dump(2));", "src/cli/a.cpp")
+        self.write("src/cli/a.cpp", SPDX_CPP)
+        self.write("src/core/json.cpp", SPDX_CPP + "Json::parse(text);\njson.dump(2);\n")
+        self.assertEqual(self.problems(), [])
+
     def test_include_of_a_higher_layer(self):
         self.assert_found("a higher layer", '#include "plumbline/mapping/mapping.hpp"', "src/core/a.cpp")
 

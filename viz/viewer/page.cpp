@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "encode.hpp"
+#include "plumbline/core/json.hpp"
 #include "sources.hpp"
 
 namespace plumbline::viewer {
@@ -192,7 +193,7 @@ Json scene_json(const Scene& scene, Pieces& pieces, Cost& cost) {
 
 /// JSON that may be put into a script: nothing in it ends the script or begins a comment.
 std::string in_script(const Json& json) {
-  const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  const std::string text = core::json_text(json, -1);
   std::string out;
   out.reserve(text.size());
   for (const char c : text) {
@@ -258,7 +259,7 @@ std::string cloud_json(const Points& points, bool z_up) {
   Cost cost;
   Json json = cloud_json(points, z_up, pieces, cost);
   json["data"] = pieces.base64;
-  return json.dump();
+  return core::json_text(json, -1);
 }
 
 Eigen::Vector3d upright(const Eigen::Vector3d& place, bool z_up) { return shown(place, z_up); }

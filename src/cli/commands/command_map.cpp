@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -12,7 +11,9 @@
 
 #include "app.hpp"
 #include "live_page.hpp"
+#include "plumbline/core/json.hpp"
 #include "plumbline/pipeline/map_recording.hpp"
+#include "terminal/print.hpp"
 #include "terminal/signals.hpp"
 
 namespace plumbline::cli {
@@ -20,12 +21,12 @@ namespace {
 
 /// "83 of 400 frames" for the result of a run that Ctrl-C ended; "" for others.
 std::string stopped_after(const std::filesystem::path& result) {
-  std::ifstream stream(result / "summary.json");
-  const auto summary = nlohmann::json::parse(stream, nullptr, false);
-  if (!summary.is_object() || summary.value("stopped", nlohmann::json()) != true) return "";
+  const auto summary = core::read_json(result / "summary.json");
+  if (!summary || !summary->is_object() || summary->value("stopped", nlohmann::ordered_json()) != true)
+    return "";
   const auto count = [&](const char* name) {
-    const nlohmann::json::json_pointer place(name);
-    return summary.contains(place) ? summary.at(place).dump() : std::string("?");
+    const nlohmann::ordered_json::json_pointer place(name);
+    return summary->contains(place) ? core::json_text(summary->at(place), -1) : std::string("?");
   };
   return fmt::format("{} of {} frames", count("/frames/read"), count("/frames/available"));
 }
@@ -50,7 +51,7 @@ int map(Session& session, pipeline::MapRequest request, const std::vector<std::s
     }
 
     if (!session.quiet) {
-      fmt::print(
+      print(
           "{}: is finished; there is nothing to continue; to map again, with other options too, leave "
           "out --resume and add --force\n",
           request.output.string());

@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "plumbline/core/json.hpp"
 #include "plumbline/core/option_schema.hpp"
 
 namespace plumbline::cloud {
@@ -61,7 +62,7 @@ std::string filter_chain_schema(const FilterRegistry& registry) {
   schema["properties"]["description"] = {{"type", "string"}};
   schema["properties"]["filters"] = {{"$ref", "#/definitions/filters"}};
   schema["definitions"] = filter_definitions(registry);
-  return schema.dump(2) + "\n";
+  return core::json_text(schema);
 }
 
 }  // namespace plumbline::cloud

@@ -12,10 +12,12 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "plumbline/core/json.hpp"
+
 namespace plumbline::dataset {
 namespace {
 
-using nlohmann::json;
+using json = nlohmann::ordered_json;
 
 /// Crop of the whole sensor in one depth mode: the sensor's size in pixels of the mode, and the origin of the
 /// image in it.
@@ -198,11 +200,12 @@ core::Result<sensor::Camera> azure_kinect_camera(const std::string& calibration,
                     mode_names(kColorModes)));
   }
 
-  const json parsed = json::parse(calibration.begin(), calibration.end(), nullptr, false);
-  const auto depth_camera = camera_in_mode(camera_for(parsed, "PurposeDepth"), *depth);
+  const auto parsed = core::parse_json(calibration, "calibration.json");
+  if (!parsed) return tl::unexpected(parsed.error());
+  const auto depth_camera = camera_in_mode(camera_for(*parsed, "PurposeDepth"), *depth);
   if (!depth_camera) return tl::unexpected(depth_camera.error());
 
-  const auto color_camera = camera_in_mode(camera_for(parsed, "PurposePhotoVideo"), *color);
+  const auto color_camera = camera_in_mode(camera_for(*parsed, "PurposePhotoVideo"), *color);
   if (!color_camera) return tl::unexpected(color_camera.error());
 
   sensor::Camera camera;

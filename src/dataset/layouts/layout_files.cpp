@@ -2,7 +2,6 @@
 // Helpers for the readers of several layouts: numbered images, poses in files of their own.
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -36,17 +35,7 @@ bool is_file(const fs::path& path) {
   return fs::is_regular_file(path, ignored);
 }
 
-nlohmann::json read_json_file(const fs::path& file) {
-  constexpr std::uintmax_t kMost = 64'000'000;
-  std::error_code problem;
-  const std::uintmax_t size = fs::file_size(file, problem);
-  if (problem || size > kMost) return nullptr;
-  std::ifstream stream(file, std::ios::binary);
-  nlohmann::json read = nlohmann::json::parse(stream, nullptr, false);
-  return read.is_discarded() ? nlohmann::json(nullptr) : read;
-}
-
-std::optional<double> json_number(const nlohmann::json& object, const char* key) {
+std::optional<double> json_number(const nlohmann::ordered_json& object, const char* key) {
   const auto found = object.is_object() ? object.find(key) : object.end();
   if (found == object.end() || !found->is_number()) return std::nullopt;
   const auto value = found->get<double>();

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "layout.hpp"
+#include "plumbline/core/json.hpp"
 
 namespace plumbline::dataset {
 namespace {
@@ -30,12 +31,13 @@ struct PolycamFrame {
   geometry::Rigid3 world_from_camera;
 };
 
-/// None if a number is missing, or the transform is not rigid.
-std::optional<PolycamFrame> read_polycam_camera(const fs::path& file) {
-  const nlohmann::json camera_file = read_json_file(file);
+/// Errors (kInput): no JSON, a number is missing, or the transform is not rigid.
+core::Result<PolycamFrame> read_polycam_camera(const fs::path& file) {
+  const auto camera_file = core::read_json(file);
+  if (!camera_file) return tl::unexpected(camera_file.error());
   bool whole = true;
   const auto number = [&](const char* key) {
-    const auto value = json_number(camera_file, key);
+    const auto value = json_number(*camera_file, key);
     whole = whole && value.has_value();
     return value.value_or(0.0);
   };
@@ -56,11 +58,14 @@ std::optional<PolycamFrame> read_polycam_camera(const fs::path& file) {
 
   const Eigen::Matrix3d rotation = t.leftCols<3>();
   const double bent = (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (!whole || !(bent < 0.01)) return std::nullopt;
+  if (!whole) return core::input_error(file.string() + ": holds no camera: a number is missing");
+  if (!(bent < 0.01))
+    return core::input_error(file.string() + ": the transform is not a rotation and a shift");
 
   sensor::Camera camera;
   camera.color = frame.pinhole;
-  if (!sensor::camera_problem(camera).empty()) return std::nullopt;
+  if (const std::string wrong = sensor::camera_problem(camera); !wrong.empty())
+    return core::input_error(fmt::format("{}: {}", file.string(), wrong));
   frame.world_from_camera = from_arkit(geometry::Rigid3(Eigen::Quaterniond(rotation), t.col(3)));
   return frame;
 }
@@ -87,11 +92,12 @@ core::Result<Layout> read_polycam(const fs::path& folder, const LayoutOptions& /
   Layout layout{"polycam", {}, std::nullopt};
   geometry::Trajectory poses;
   std::size_t left_out = 0;
+  std::string first_problem;
 
   for (const PairInfo& pair : pair_numbered(color, depth, kMicroseconds)) {
     const auto frame = read_polycam_camera(cameras / (fs::path(pair.color_file).stem().string() + ".json"));
     if (!frame) {
-      ++left_out;
+      if (left_out++ == 0) first_problem = "; the first of them: " + frame.error().message;
       continue;
     }
     layout.pairs.push_back(pair);
@@ -103,14 +109,15 @@ core::Result<Layout> read_polycam(const fs::path& folder, const LayoutOptions& /
   if (layout.pairs.empty()) {
     return core::input_error(
         fmt::format("{}: no number is in images/ ({} images), depth/ ({}) and {}/ at once, with a camera "
-                    "that can be read ({} cannot)",
-                    keyframes.string(), color.size(), depth.size(), cameras.filename().string(), left_out));
+                    "that can be read ({} cannot){}",
+                    keyframes.string(), color.size(), depth.size(), cameras.filename().string(), left_out,
+                    first_problem));
   }
 
   if (left_out > 0) {
     log.warning(
-        fmt::format("{}: {} frames are left out, for their camera files are missing or hold no camera",
-                    cameras.string(), left_out));
+        fmt::format("{}: {} frames are left out, for their camera files are missing or hold no camera{}",
+                    cameras.string(), left_out, first_problem));
   }
 
   if (corrected) log.info("polycam: the corrected images and poses are used");

@@ -9,12 +9,13 @@
 #include <nlohmann/json.hpp>
 
 #include "layout.hpp"
+#include "plumbline/core/json.hpp"
 
 namespace plumbline::dataset {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
+using json = nlohmann::ordered_json;
 
 /// The folder of the export: that was given, or EXR_RGBD/ in it.
 fs::path export_folder(const fs::path& folder) {
@@ -103,7 +104,9 @@ void add_record3d_cameras(const json& metadata, const sensor::Pinhole& nominal, 
 
 core::Result<Layout> read_record3d(const fs::path& folder, const LayoutOptions& /*options*/, core::Log& log) {
   const fs::path place = export_folder(folder);
-  const json metadata = read_json_file(place / "metadata.json");
+  const auto read = core::read_json(place / "metadata.json");
+  if (!read) return tl::unexpected(read.error());
+  const json& metadata = *read;
   auto camera = record3d_camera(place / "metadata.json", metadata);
   if (!camera) return tl::unexpected(camera.error());
 

@@ -203,7 +203,8 @@ core::Result<LiveSurvey> survey_stream(const std::string& address, MessageStream
   const auto until = Clock::now() + patience;
   while (Clock::now() < until && !surveyor.complete()) {
     if (stop.stop_requested())
-      return core::input_error(address + ": stopped before a camera was found; nothing is written");
+      return core::failure(core::ErrorKind::kStopped,
+                           address + ": stopped before a camera was found; nothing is written");
     surveyor.listen();
   }
   if (!surveyor.any_image()) return no_camera(address, stream.topics(), patience);

@@ -11,6 +11,7 @@
 
 #include "clouds/mesh.hpp"
 #include "formats.hpp"
+#include "plumbline/core/json.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/core/version.hpp"
 
@@ -162,7 +163,7 @@ core::Result<ExportSummary> write_glb(MapSource& source, const std::filesystem::
   if (!data) return tl::unexpected(data.error());
 
   const Json json = glb_json(*data, source.name(), source.frame_text());
-  std::string text = json.dump();
+  std::string text = core::json_text(json, -1);
   text.append((4 - text.size() % 4) % 4, ' ');
 
   // All parts are whole words.

@@ -10,6 +10,7 @@
 
 #include "formats.hpp"
 #include "pictures/model.hpp"
+#include "plumbline/core/json.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "source/export_folder.hpp"
 
@@ -96,7 +97,7 @@ core::Result<ExportSummary> write_nerfstudio(MapSource& source, const std::files
 
   if (written)
     written = core::write_file(folder->path() / "transforms.json",
-                               transforms_json(source, *pictures, has_depth).dump(2) + "\n");
+                               core::json_text(transforms_json(source, *pictures, has_depth)));
 
   if (written)
     written =

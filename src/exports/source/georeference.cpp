@@ -12,6 +12,7 @@
 #include <system_error>
 
 #include "plumbline/cloud/io/cloud_io.hpp"
+#include "plumbline/core/json.hpp"
 #include "plumbline/core/output_file.hpp"
 
 namespace plumbline::exports {
@@ -113,7 +114,7 @@ core::Result<void> write_georeference(const std::filesystem::path& file, const G
     json["linear"].push_back({linear(row, 0), linear(row, 1), linear(row, 2)});
 
   json["wkt"] = reference.wkt;
-  return core::write_file(georeference_file(file), json.dump(2) + "\n");
+  return core::write_file(georeference_file(file), core::json_text(json));
 }
 
 void remove_georeference(const std::filesystem::path& file) {

@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "plumbline/cloud/sensor_pose.hpp"
+#include "plumbline/core/json.hpp"
 #include "plumbline/maps/frame_pose.hpp"
 #include "plumbline/maps/store.hpp"
 #include "plumbline/viewer/page.hpp"
@@ -144,8 +145,8 @@ void LiveMap::Impl::show(const maps::StoreReader& reader, const maps::StoredMap&
     if (!cloud) continue;
     const std::string json = viewer::cloud_json(placed(**cloud, pose), false);
 
-    server.send("{\"key\":" + Json(name).dump() + ",\"robot\":" + std::to_string(colors[robot->second]) +
-                    ",\"cloud\":" + json + "}",
+    server.send("{\"key\":" + core::json_text(name, -1) +
+                    ",\"robot\":" + std::to_string(colors[robot->second]) + ",\"cloud\":" + json + "}",
                 name);
     sent[name] = pose;
     --budget;
@@ -223,11 +224,11 @@ void LiveMap::Impl::look() {
   if (line.empty()) {
     for (const Json& robot : robots) {
       line += line.empty() ? "" : "; ";
-      line += robot["name"].get<std::string>() + ": " + robot["keyframes"].dump() + " keyframes";
+      line +=
+          robot["name"].get<std::string>() + ": " + core::json_text(robot["keyframes"], -1) + " keyframes";
     }
   }
-  server.send(Json({{"robots", robots}, {"told", line}}).dump(-1, ' ', false, Json::error_handler_t::replace),
-              "robots");
+  server.send(core::json_text({{"robots", robots}, {"told", line}}, -1), "robots");
 }
 
 void LiveMap::Impl::follow() {

@@ -13,9 +13,11 @@
 #include <utility>
 
 #include "hub/hub_server.hpp"
+#include "plumbline/core/json.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/core/own_files.hpp"
 #include "plumbline/core/side_thread.hpp"
+#include "plumbline/core/text.hpp"
 #include "plumbline/maps/output_folder.hpp"
 #include "plumbline/maps/stored_maps.hpp"
 
@@ -32,7 +34,8 @@ class LogFile : public core::Log {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       const std::time_t now = std::time(nullptr);
-      file_ << fmt::format("{:%Y-%m-%d %H:%M:%S} {}\n", fmt::localtime(now), message) << std::flush;
+      file_ << fmt::format("{:%Y-%m-%d %H:%M:%S} {}\n", fmt::localtime(now), core::printable(message))
+            << std::flush;
     }
     next_.write(level, message);
   }
@@ -76,9 +79,9 @@ nlohmann::json json_of(const std::vector<RobotTraffic>& traffic) {
 /// Adds the network's traffic, the meetings and the reason to the summary of the fusion.
 core::Result<void> add_network(const fs::path& file, const std::vector<RobotTraffic>& traffic,
                                const std::vector<pipeline::Meeting>& meetings, const std::string& reason) {
-  std::ifstream in(file);
-  auto summary = nlohmann::ordered_json::parse(in, nullptr, false);
-  if (summary.is_discarded()) return core::output_error(file.string() + ": cannot be read again");
+  auto read = core::read_json(file);
+  if (!read) return core::output_error(read.error().message);
+  nlohmann::ordered_json& summary = *read;
   summary["network"] = json_of(traffic);
   for (const pipeline::Meeting& m : meetings) {
     summary["meetings"].push_back(
@@ -86,7 +89,7 @@ core::Result<void> add_network(const fs::path& file, const std::vector<RobotTraf
   }
   summary["trustworthy"] = reason.empty();
   summary["reason"] = reason;
-  return core::write_file(file, summary.dump(2) + "\n");
+  return core::write_file(file, core::json_text(summary));
 }
 
 void add_reason(const std::string& why, std::string& reason) { reason += (reason.empty() ? "" : "; ") + why; }

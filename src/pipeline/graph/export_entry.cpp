@@ -10,7 +10,8 @@ namespace plumbline::pipeline {
 
 void ExportEntry::declare(core::OptionTable& table) {
   table.text("file", file, "File or folder below the result folder");
-  table.text("format", format, "A format of plumbline export; empty: by the file's ending");
+  table.text("format", format, "A format of plumbline export; empty: by the file's ending",
+             core::EmptyValue::kAllowed);
   table.choice("what", what, {"cloud", "mesh", "trajectory", "keyframes", "lines"},
                "Part of the map to write, if the ending does not determine it");
 }

@@ -3,6 +3,7 @@
 
 #include "graph/export_entry.hpp"
 #include "plumbline/cloud/filters/filter_schema.hpp"
+#include "plumbline/core/json.hpp"
 #include "plumbline/core/option_schema.hpp"
 #include "plumbline/pipeline/reference.hpp"
 
@@ -137,7 +138,7 @@ std::string pipeline_schema(const StageRegistry& registry) {
       {"description", "Information on the run in a result's config.yaml; it is not used as configuration"}};
   schema["allOf"] = Json::array({with_or_without_include()});
   schema["definitions"] = definitions(registry);
-  return schema.dump(2) + "\n";
+  return core::json_text(schema);
 }
 
 std::string stage_schema(const StageType& type, const StageRegistry& registry) {
@@ -148,7 +149,7 @@ std::string stage_schema(const StageType& type, const StageRegistry& registry) {
   Json filters = cloud::filter_definitions(registry.filters());
   if (schema["properties"].contains("filters")) schema["definitions"] = std::move(filters);
   if (schema["properties"].contains("exports")) schema["definitions"]["exports"] = exports_definition();
-  return schema.dump(2) + "\n";
+  return core::json_text(schema);
 }
 
 }  // namespace plumbline::pipeline

@@ -7,6 +7,7 @@
 
 #include <utility>
 
+#include "plumbline/core/json.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/viz/snapshot.hpp"
@@ -80,7 +81,7 @@ std::string text_of(const Meeting& meeting, const MeetingEvent& event,
       {"evidence", section_of(RobotMerge{meeting.a, meeting.b, -1.0, -1.0, event.evidence})}};
 
   if (meeting.time_s >= 0.0) json["time_s"] = meeting.time_s;
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return core::json_text(json);
 }
 
 }  // namespace

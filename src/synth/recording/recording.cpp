@@ -6,6 +6,7 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
+#include "plumbline/core/json.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/core/version.hpp"
 #include "plumbline/dataset/image_io.hpp"
@@ -233,7 +234,7 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
   }
 
   summary.stopped = stop.stop_requested();
-  const std::string json = describe_world(scene, options, summary, *robots).dump(2) + "\n";
+  const std::string json = core::json_text(describe_world(scene, options, summary, *robots));
   if (auto ok = core::write_file(output / "scene.json", json); !ok) return fail(ok.error());
 
   log.info(fmt::format("{}: {} frames of {} robot(s) in {:.1f} s, {} reference samples ({} visible)",

@@ -248,6 +248,15 @@ TEST_F(Record3d, LaterVersionsSayMore) {
   EXPECT_TRUE((*source)->read(1));
 }
 
+TEST_F(Record3d, DeepJsonIsRefusedAtItsPlace) {
+  write();
+  write_text("EXR_RGBD/metadata.json", std::string(150000, '['));
+  EXPECT_THAT(open_error(),
+              AllOf(HasSubstr("metadata.json:1:65"), HasSubstr("nested deeper than 64 levels")));
+  write_text("EXR_RGBD/metadata.json", "{\"K\": [52, 0,\n 0, }");
+  EXPECT_THAT(open_error(), AllOf(HasSubstr("metadata.json:2:5"), HasSubstr("is not valid JSON")));
+}
+
 TEST_F(Record3d, WithoutACameraItIsRefused) {
   metadata_.erase("K");
   write();

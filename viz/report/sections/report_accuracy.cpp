@@ -5,9 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
+#include <nlohmann/json.hpp>
 #include <system_error>
 
+#include "plumbline/core/json.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/evaluate/companions.hpp"
 #include "report_fill.hpp"
@@ -157,8 +158,7 @@ std::string saved_html(const ReportData& data) {
   std::string out;
 
   for (const std::string& name : names) {
-    std::ifstream stream(data.folder / name, std::ios::binary);
-    const Json json = Json::parse(stream, nullptr, false);
+    const Json json = core::read_json(data.folder / name).value_or(Json());
 
     if (json.is_object() && json.contains("ate_m")) {
       add_saved_path(name, json, paths);
