@@ -66,6 +66,17 @@ def serves(view):
         check(view.get(method=method)[0] in (400, 404, 405), method)
 
 
+def two_hosts(view):
+    """A second name behind the right one is no way round the check of names."""
+    for names, wanted in ((["127.0.0.1"], b"200"), (["127.0.0.1", "example.org"], b"400"),
+                          (["example.org", "127.0.0.1"], b"400"), (["127.0.0.1", "127.0.0.1"], b"400")):
+        request = view.raw()
+        hosts = "".join(f"Host: {name}:{view.port}\r\n" for name in names)
+        request.sendall(f"GET / HTTP/1.1\r\n{hosts}\r\n".encode())
+        check(request.recv(4096).split(b" ")[1] == wanted, f"Host {names}: not {wanted}")
+        request.close()
+
+
 def asks_for_its_token(program, cloud):
     with View(program, cloud, "--http-token", "secret") as view:
         check(view.address.endswith("/?token=secret"), view.address)
@@ -73,6 +84,22 @@ def asks_for_its_token(program, cloud):
                              ("/?token=secret", 200), ("/events", 401)):
             check(view.get(path)[0] == wanted, f"{path}: not {wanted}")
         check(view.get(Authorization="Bearer secret")[0] == 200, "Bearer")
+
+    with View(program, cloud, "--http-token", "a&b#c d+e") as view:
+        check(view.address.endswith("/?token=a%26b%23c%20d%2Be"), view.address)
+        check(view.get(view.address[view.address.index("/?"):])[0] == 200, "the address that it prints does not open")
+
+
+def warns_of_others(program, cloud):
+    """Told before the page is made, if others than this machine reach it and nothing is asked for."""
+    for host, options, warned in (("0.0.0.0", (), True), ("0.0.0.0", ("--http-token", "secret"), False),
+                                  ("127.0.0.1", (), False), ("localhost", (), False)):
+        process = subprocess.Popen([program, "view", cloud, "--http", f"{host}:0", *options],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        process.stdout.readline()
+        process.terminate()
+        told = "everybody who reaches this address" in process.communicate()[1]
+        check(told == warned, f"{host} {options}: {'a' if told else 'no'} warning")
 
 
 def streams(view):
@@ -155,9 +182,11 @@ def main():
     cloud.write_text("".join(f"{x / 10} {y / 10} {(x + y) % 3 / 50}\n" for x in range(60) for y in range(60)))
     with View(program, cloud) as view:
         serves(view)
+        two_hosts(view)
         took = streams(view)
         crowds(view)
     asks_for_its_token(program, cloud)
+    warns_of_others(program, cloud)
     for wrong in ("127.0.0.1:99999", "127.0.0.1:x", ":"):
         done = subprocess.run([program, "view", cloud, "--http", wrong], capture_output=True, text=True)
         check(done.returncode == 2 and "HOST:PORT" in done.stderr, f"--http {wrong}: {done.returncode} {done.stderr}")

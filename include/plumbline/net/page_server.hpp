@@ -24,6 +24,9 @@ core::Result<PageServerOptions> page_server_options(const std::string& address, 
 /// host or port.
 core::Result<void> check_listening(const PageServerOptions& options);
 
+/// A warning if other machines than this one reach the address and no token is asked for; else "".
+std::string open_to_others(const PageServerOptions& options);
+
 /// Limits of a server: connections at once (the rest are closed unread); event streams;
 /// threads for pages besides them; events that wait for a slow stream, which loses the oldest beyond.
 struct PageServerLimits {
@@ -34,8 +37,8 @@ struct PageServerLimits {
 };
 
 /// Serves GET / (the page) and GET /events. Refused are other paths and methods (404), a Host or an Origin
-/// that is not the server's own (403), a wrong token (401), and excess streams (503). A request must be
-/// complete within a second. Thread-safe; send() never waits for a client.
+/// that is not the server's own (403), more than one Host (400), a wrong token (401), and excess streams
+/// (503). A request must be complete within a second. Thread-safe; send() never waits for a client.
 class PageServer {
  public:
   /// Errors (kUsage): the server cannot listen at the address; (kInternal): the part is missing.
@@ -45,7 +48,7 @@ class PageServer {
   ~PageServer();  ///< ends all connections
 
   [[nodiscard]] int port() const;
-  /// "http://127.0.0.1:8080/", with the token.
+  /// "http://127.0.0.1:8080/", with the token, percent-encoded.
   [[nodiscard]] std::string address() const;
   /// An event for each stream that is open: one line of JSON. With a `topic` it is kept, in the place of the
   /// last one of the same, for streams that open later.

@@ -200,6 +200,7 @@ bool own_name(const Running& running, const std::string& host) {
 /// Status of a request that is refused; 0: it is not.
 int refused(const Running& running, const httplib::Request& request) {
   const std::string scheme = "http://";
+  if (request.get_header_value_count("Host") > 1) return 400;
   if (!own_name(running, request.get_header_value("Host"))) return 403;
   if (request.has_header("Origin")) {
     const std::string origin = request.get_header_value("Origin");
@@ -266,9 +267,10 @@ void set_routes(Running& running) {
         const int status = refused(running, request);
         if (status == 0) return httplib::Server::HandlerResponse::Unhandled;
         response.status = status;
-        response.set_content(
-            status == 401 ? "a token is asked for: ?token=...\n" : "this name is not served here\n",
-            "text/plain");
+        response.set_content(status == 401   ? "a token is asked for: ?token=...\n"
+                             : status == 400 ? "one Host is enough\n"
+                                             : "this name is not served here\n",
+                             "text/plain");
         return httplib::Server::HandlerResponse::Handled;
       });
 

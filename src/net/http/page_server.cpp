@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 #include <netdb.h>
+#include <netinet/in.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -10,6 +11,7 @@
 #include <cctype>
 #include <cerrno>
 #include <cstring>
+#include <memory>
 #include <utility>
 
 #include "http/http_functions.hpp"
@@ -46,6 +48,41 @@ std::string problem_text(int problem, const PageServerOptions& options) {
   }
 }
 
+/// The text as a value in an address, where "&" and "#" would end it (RFC 3986: all but the unreserved is
+/// encoded).
+std::string percent_encoded(const std::string& text) {
+  std::string encoded;
+  for (const char c : text) {
+    const bool plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || std::strchr("-._~", c) != nullptr;
+    encoded += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+  }
+  return encoded;
+}
+
+/// True if only this machine reaches the address.
+bool is_loopback(const addrinfo& address) {
+  if (address.ai_family == AF_INET) {
+    const auto* four = reinterpret_cast<const sockaddr_in*>(address.ai_addr);
+    return (ntohl(four->sin_addr.s_addr) >> 24) == IN_LOOPBACKNET;
+  }
+  return address.ai_family == AF_INET6 &&
+         IN6_IS_ADDR_LOOPBACK(&reinterpret_cast<const sockaddr_in6*>(address.ai_addr)->sin6_addr) != 0;
+}
+
+using Addresses = std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)>;
+
+/// The addresses at which a server of these options listens; null: there is no such host.
+Addresses addresses_of(const PageServerOptions& options) {
+  addrinfo wanted{};
+  wanted.ai_family = AF_UNSPEC;
+  wanted.ai_socktype = SOCK_STREAM;
+  wanted.ai_flags = AI_PASSIVE;
+  addrinfo* found = nullptr;
+  const int problem =
+      ::getaddrinfo(options.host.c_str(), std::to_string(options.port).c_str(), &wanted, &found);
+  return Addresses(problem == 0 ? found : nullptr, &::freeaddrinfo);
+}
+
 }  // namespace
 
 core::Result<PageServerOptions> page_server_options(const std::string& address, const std::string& token) {
@@ -67,26 +104,33 @@ core::Result<PageServerOptions> page_server_options(const std::string& address, 
 }
 
 core::Result<void> check_listening(const PageServerOptions& options) {
-  addrinfo wanted{};
-  wanted.ai_family = AF_UNSPEC;
-  wanted.ai_socktype = SOCK_STREAM;
-  wanted.ai_flags = AI_PASSIVE;
-  addrinfo* found = nullptr;
-  if (::getaddrinfo(options.host.c_str(), std::to_string(options.port).c_str(), &wanted, &found) != 0) {
+  const Addresses found = addresses_of(options);
+  if (!found) {
     return core::usage_error(
         fmt::format("--http {0}:{1}: there is no host {0}; write HOST:PORT, such as 127.0.0.1:8080",
                     options.host, options.port));
   }
 
   int problem = 0;
-  for (const addrinfo* address = found; address != nullptr; address = address->ai_next) {
+  for (const addrinfo* address = found.get(); address != nullptr; address = address->ai_next) {
     problem = bind_problem(*address);
     if (problem == 0) break;
   }
-  ::freeaddrinfo(found);
   if (problem == 0) return {};
   return core::usage_error(
       fmt::format("--http {}:{}: {}", options.host, options.port, problem_text(problem, options)));
+}
+
+std::string open_to_others(const PageServerOptions& options) {
+  if (!options.token.empty()) return {};
+  const Addresses found = addresses_of(options);
+  for (const addrinfo* address = found.get(); address != nullptr; address = address->ai_next) {
+    if (is_loopback(*address)) continue;
+    return fmt::format(
+        "--http {}:{}: everybody who reaches this address sees the map; --http-token TEXT asks for a token",
+        options.host, options.port);
+  }
+  return {};
 }
 
 core::Result<PageServer> PageServer::start(const PageServerOptions& options, std::string page) {
@@ -113,7 +157,7 @@ int PageServer::port() const { return options_.port; }
 std::string PageServer::address() const {
   const bool six = options_.host.find(':') != std::string::npos;
   return fmt::format("http://{}{}{}:{}/{}{}", six ? "[" : "", options_.host, six ? "]" : "", options_.port,
-                     options_.token.empty() ? "" : "?token=", options_.token);
+                     options_.token.empty() ? "" : "?token=", percent_encoded(options_.token));
 }
 
 void PageServer::send(const std::string& json, const std::string& topic) {
