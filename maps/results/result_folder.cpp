@@ -19,7 +19,7 @@ std::vector<std::filesystem::path> ResultFolder::robot_folders() const {
   std::error_code ec;
   for (std::filesystem::directory_iterator it(folder / "robots", ec), end; !ec && it != end;
        it.increment(ec)) {
-    if (it->is_directory(ec)) folders.push_back(it->path());
+    if (std::filesystem::is_regular_file(it->path() / "trajectory.txt", ec)) folders.push_back(it->path());
   }
   std::sort(folders.begin(), folders.end());
   if (folders.empty()) folders.push_back(folder);
@@ -27,6 +27,7 @@ std::vector<std::filesystem::path> ResultFolder::robot_folders() const {
 }
 
 core::Result<ResultFolder> open_result(const std::filesystem::path& folder) {
+  if (folder.empty()) return core::usage_error("the path of the result is empty");
   std::error_code ec;
   if (std::filesystem::is_regular_file(folder, ec)) {
     return core::input_error(

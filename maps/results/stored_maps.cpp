@@ -11,6 +11,7 @@
 #include <system_error>
 #include <utility>
 
+#include "plumbline/core/text.hpp"
 #include "plumbline/maps/map_join.hpp"
 
 namespace plumbline::maps {
@@ -62,7 +63,7 @@ core::Result<StoredPart> StoredMaps::read_part(const fs::path& map) {
     return core::input_error(fmt::format("{}: the map has no keyframes; leave it out", file.string()));
   }
 
-  StoredPart part{name_of(file), std::move(*run), {}};
+  StoredPart part{core::folder_name(name_of(file)), std::move(*run), {}};
   part.robots = part.run.stored().header.robots;
   if (part.robots.size() == 1) part.robots.front().name = part.name;
   return part;
@@ -107,7 +108,7 @@ core::Result<void> StoredMaps::arrange(const core::Executor& executor) {
       to[robot.number] = number;
       robot.number = number++;
       robot.versions.clear();
-      robot.name = free_name(robot.name, robot_names);
+      robot.name = free_name(core::folder_name(robot.name), robot_names);
       robots_.push_back(robot);
     }
 

@@ -37,6 +37,7 @@ const core::ConfigNode* fuse_stage_of(const core::ConfigNode& root) {
 }  // namespace
 
 core::Result<MapPlace> find_map(const fs::path& input) {
+  if (input.empty()) return core::usage_error("the path of the map is empty");
   std::error_code ec;
   MapPlace place;
   if (fs::is_regular_file(input, ec) && input.extension() == ".db") {
@@ -46,7 +47,7 @@ core::Result<MapPlace> find_map(const fs::path& input) {
 
   if (!fs::exists(input, ec)) {
     const fs::path left = OutputFolder::partial_of(input) / kStoreFile;
-    if (!input.empty() && fs::is_regular_file(left, ec)) {
+    if (fs::is_regular_file(left, ec)) {
       place.store = left;
       return place;
     }

@@ -383,6 +383,65 @@ class Results(Folder):
             both.image(0, robot="typo")
         self.assertTrue(both.trustworthy, both.reason)
 
+    def test_names_that_are_not_plain(self):
+        for name, told in (('a, "b"', 'a, "b"'), ("=1+1", "=1+1"), ("two\nlines", "two\\nlines"), (b"caf\xe9", "caf\ufffd")):
+            folder = Path(os.fsdecode(os.fsencode(self.work) + b"/" + os.fsencode(name)))
+            shutil.copytree(self.recording, folder)
+            result = plumbline.map(folder, self.work / "named", pipeline="known_poses", end=0.4, force=True,
+                                   output={"views": ""})
+            self.assertEqual(set(result.keyframes.robots), {told})
+            self.assertEqual(result.summary["input"], told)
+
+    def test_a_damaged_table_is_an_input_error(self):
+        folder = self.work / "damaged"
+        shutil.copytree(self.work / "out", folder)
+        for text in ("robot,keyframe\na,b\n", "robot,keyframe,stamp\nr,0,x\n", "", "robot\nr,1,2\n"):
+            (folder / "keyframes.csv").write_text(text)
+            if text:
+                with self.assertRaisesRegex(plumbline.InputError, "keyframes.csv"):
+                    plumbline.load(folder).keyframes
+        os.remove(folder / "keyframes.csv")
+        with self.assertRaisesRegex(plumbline.InputError, "keyframes.csv: cannot be read"):
+            plumbline.load(folder).keyframes
+        (folder / "summary.json").write_text("[" * 100000)
+        with self.assertRaisesRegex(plumbline.InputError, "summary.json:1:65: .*nested deeper than 64 levels"):
+            plumbline.load(folder).summary
+
+    def test_one_robot_of_several_in_the_map(self):
+        folder = self.work / "left_out"
+        shutil.copytree(self.work / "out", folder)
+        name = Path(self.recording).name
+        for robot in (name, "other"):
+            (folder / "robots" / robot).mkdir(parents=True)
+            shutil.copy(folder / "camera.yaml", folder / "robots" / robot)
+        for file in ("trajectory.txt", "keyframes.txt"):
+            (folder / file).rename(folder / "robots" / name / file)
+        result = plumbline.load(folder)
+        np.testing.assert_array_equal(result.trajectory.poses, self.result.trajectory.poses)
+        self.assertEqual(list(result.robots), [name])
+        self.assertEqual(result.trajectory.covariance.shape, (60, 6, 6))
+
+    def test_empty_paths_are_usage_errors(self):
+        calls = {
+            "map": [lambda: plumbline.render("", "top"), lambda: plumbline.export("", "x.ply")],
+            "folder": [lambda: plumbline.load("")],
+            "recording": [lambda: plumbline.map("", "x"), lambda: plumbline.map(["", ""], "x")],
+            "output": [lambda: plumbline.map(self.recording, ""), lambda: plumbline.export(self.result, ""),
+                       lambda: plumbline.fuse([self.result], "")],
+            "maps": [lambda: plumbline.fuse(["", self.result], "x")],
+            "input": [lambda: plumbline.open("")],
+            "file": [lambda: plumbline.Cloud.read(""), lambda: plumbline.Trajectory.read(""),
+                     lambda: self.result.trajectory.write("")],
+            "name_or_file": [lambda: plumbline.camera("")],
+            "truth": [lambda: plumbline.evaluate_trajectory(self.result, "")],
+            "cloud": [lambda: plumbline.evaluate_cloud("")],
+            "chain": [lambda: plumbline.filter(self.result.cloud, "")],
+        }
+        for argument, made in calls.items():
+            for call in made:
+                with self.assertRaisesRegex(plumbline.ConfigError, f"^{argument}: is empty"):
+                    call()
+
     def test_no_result_is_an_input_error(self):
         with self.assertRaisesRegex(plumbline.InputError, "world"):
             plumbline.load(self.work / "world")

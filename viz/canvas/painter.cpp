@@ -8,6 +8,8 @@
 
 #include <cmath>
 
+#include "plumbline/core/text.hpp"
+
 namespace plumbline::viz {
 namespace {
 
@@ -70,13 +72,13 @@ void Painter::text(const Eigen::Vector2d& at, const std::string& text, double si
   vtkTextProperty* property = context_->GetTextProp();
   if (anchor == Anchor::kCentre) property->SetJustificationToCentered();
   if (anchor == Anchor::kRight) property->SetJustificationToRight();
-  context_->DrawString(static_cast<float>(at.x()), static_cast<float>(at.y()), text.c_str());
+  context_->DrawString(static_cast<float>(at.x()), static_cast<float>(at.y()), core::printable(text).c_str());
 }
 
 double Painter::text_width(const std::string& text, double size_px, bool bold) {
   set_text(context_, size_px * scale_, Rgb{}, bold);
   float bounds[4] = {0.0F, 0.0F, 0.0F, 0.0F};
-  context_->ComputeStringBounds(text.c_str(), bounds);
+  context_->ComputeStringBounds(core::printable(text).c_str(), bounds);
   return static_cast<double>(bounds[2]);
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <array>
-#include <cstdint>
 
+#include "plumbline/core/text.hpp"
 #include "plumbline/viz/svg_chart.hpp"
 
 namespace plumbline::viz {
@@ -9,21 +9,10 @@ namespace {
 
 /// Bytes of the character at the start of `text`, 0 if it is not allowed in a document.
 std::size_t character_at(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(text[i]); };
-  const std::uint8_t lead = byte(0);
-  if (lead < 0x80) return (lead >= 0x20 && lead != 0x7F) || lead == '\n' || lead == '\t' ? 1 : 0;
-  const std::size_t length = lead >= 0xF0 ? 4 : lead >= 0xE0 ? 3 : 2;
-  if (lead < 0xC2 || lead > 0xF4 || text.size() < length) return 0;
-  std::uint32_t code = lead & (0x7FU >> length);
-  for (std::size_t i = 1; i < length; ++i) {
-    if ((byte(i) & 0xC0U) != 0x80U) return 0;
-    code = code << 6U | (byte(i) & 0x3FU);
-  }
-  const bool overlong = (length == 3 && code < 0x800) || (length == 4 && code < 0x10000);
-  const bool surrogate = code >= 0xD800 && code <= 0xDFFF;
-  const bool control = code < 0xA0;
+  const auto [code, bytes] = core::first_character(text);
   const bool no_character = (code & 0xFFFEU) == 0xFFFEU || (code >= 0xFDD0 && code <= 0xFDEF);
-  return overlong || surrogate || control || no_character || code > 0x10FFFF ? 0 : length;
+  const bool control = core::is_control(code) && code != '\n' && code != '\t';
+  return no_character || control ? 0 : bytes;
 }
 
 }  // namespace

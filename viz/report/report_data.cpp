@@ -8,11 +8,13 @@
 #include <system_error>
 
 #include "plumbline/core/config.hpp"
+#include "plumbline/core/json.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/maps/output_folder.hpp"
 #include "plumbline/maps/result_folder.hpp"
 #include "plumbline/maps/stored_maps.hpp"
 #include "plumbline/maps/stored_run.hpp"
+#include "plumbline/maps/unfinished_run.hpp"
 #include "report_cloud.hpp"
 
 namespace plumbline::report {
@@ -22,10 +24,14 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 core::Result<Json> read_summary(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  Json json = Json::parse(stream, nullptr, false);
-  if (json.is_object() && json.contains("frames") && json.contains("trustworthy")) return json;
-  if (!stream.is_open()) return core::input_error(fmt::format("{}: {}", file.string(), fault_of(file)));
+  auto json = core::read_json(file);
+  if (const std::string fault = fault_of(file); !json && fault != "is damaged")
+    return core::input_error(fmt::format("{}: {}", file.string(), fault));
+  if (!json) {
+    return core::input_error(fmt::format("{}: is damaged or not of plumbline map ({}); map again",
+                                         file.string(), json.error().message));
+  }
+  if (json->is_object() && json->contains("frames") && json->contains("trustworthy")) return json;
   return core::input_error(fmt::format("{}: is damaged or not of plumbline map; map again", file.string()));
 }
 
@@ -177,7 +183,11 @@ double ReportPath::length_m() const {
 core::Result<ReportData> read_report_data(const fs::path& folder) {
   std::error_code ec;
   const fs::path partial = maps::OutputFolder::partial_of(folder);
-  const bool interrupted = fs::exists(folder / ".plumbline-unfinished", ec) ||
+  if (maps::is_running(folder) || (!fs::exists(folder, ec) && maps::is_running(partial)))
+    return core::input_error(
+        fmt::format("{}: the run is still going on; report when it has ended", folder.string()));
+
+  const bool interrupted = fs::exists(folder / maps::kUnfinishedMarker, ec) ||
                            (!fs::exists(folder, ec) && fs::is_regular_file(partial / "map.db", ec));
   if (interrupted) {
     return core::input_error(fmt::format(

@@ -11,6 +11,7 @@
 #include <limits>
 #include <sstream>
 
+#include "plumbline/core/csv.hpp"
 #include "plumbline/core/numbers.hpp"
 
 namespace plumbline::report {
@@ -24,27 +25,26 @@ core::Result<CsvTable> CsvTable::read(const std::filesystem::path& file) {
     return core::input_error(fmt::format("{} is not there or cannot be read", name));
   }
 
-  std::size_t line = 0;
-  for (std::size_t begin = 0; begin < table.text_.size(); ++line) {
-    const std::size_t end = std::min(table.text_.find('\n', begin), table.text_.size());
+  for (std::size_t at = 0, row = 0; at < table.text_.size(); ++row) {
     std::size_t cells = 0;
-
-    for (std::size_t from = begin; from <= end; ++cells) {
-      const std::size_t to = std::min(table.text_.find(',', from), end);
-      if (line == 0) {
-        table.columns_.push_back(table.text_.substr(from, to - from));
-      } else {
-        table.cells_.push_back({from, to - from});
+    for (bool last = false; !last; ++cells) {
+      const core::CsvField read = core::next_csv_field(table.text_, at);
+      last = read.last;
+      const std::string value = core::csv_text(read.field);
+      if (row == 0) {
+        table.columns_.push_back(value);
+        continue;
       }
-      from = to + 1;
+      // The text of a field is no longer than the field, and takes its place.
+      const auto begin = static_cast<std::size_t>(read.field.data() - table.text_.data());
+      table.text_.replace(begin, value.size(), value);
+      table.cells_.push_back({begin, value.size()});
     }
 
     if (cells != table.columns_.size()) {
-      return core::input_error(fmt::format("{} is damaged: line {} has {} columns of {}", name, line + 1,
+      return core::input_error(fmt::format("{} is damaged: line {} has {} columns of {}", name, row + 1,
                                            cells, table.columns_.size()));
     }
-
-    begin = end + 1;
   }
   if (table.rows() == 0) return core::input_error(fmt::format("{} is empty", name));
 

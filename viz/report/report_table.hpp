@@ -11,7 +11,7 @@
 
 namespace plumbline::report {
 
-/// Cells as plain text; our tables have no quotes.
+/// Cells as plain text, without the quotes of the table.
 class CsvTable {
  public:
   /// Errors (kInput): cannot be read, without header, or a line that does not have its columns.

@@ -160,6 +160,7 @@ struct RunContext {
   const ResumedRun* resumed = nullptr;  ///< results of the resumed run; null: none
   RunStore store;
   RunHooks hooks;
+  core::StopToken asked;  ///< by the user; `stop` is another one for sources that end by themselves
 };
 
 /// Why a result must not be trusted.

@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+
 #include "clouds/columns_text.hpp"
 #include "formats.hpp"
+#include "plumbline/core/csv.hpp"
 
 namespace plumbline::exports {
 namespace {
@@ -14,7 +17,11 @@ core::Result<ExportSummary> write_text_cloud(MapSource& source, const std::files
   const auto cloud = source.cloud();
   if (!cloud) return tl::unexpected(cloud.error());
   core::OutputFile out(output);
-  if (csv) out.write(fmt::format("{}\n", fmt::join(text_columns(**cloud), ",")));
+  if (csv) {
+    std::vector<std::string> names = text_columns(**cloud);
+    std::transform(names.begin(), names.end(), names.begin(), &core::csv_field);
+    out.write(fmt::format("{}\n", fmt::join(names, ",")));
+  }
   put_text_rows(out, **cloud, csv ? ',' : ' ');
   if (auto written = out.commit(); !written) return tl::unexpected(written.error());
   ExportSummary summary;

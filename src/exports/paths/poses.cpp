@@ -6,6 +6,7 @@
 
 #include "formats.hpp"
 #include "paths/robot_files.hpp"
+#include "plumbline/core/csv.hpp"
 #include "plumbline/maps/fusion_state.hpp"
 
 namespace plumbline::exports {
@@ -66,7 +67,7 @@ core::Result<ExportSummary> write_poses(MapSource& source, const std::filesystem
     const geometry::Rigid3 body = pose.world_from_camera * camera_from_body;
     const Eigen::Quaterniond q = body.quaternion();
     std::string row = fmt::format(
-        "{},{},{:.6f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f}", pose.robot_name,
+        "{},{},{:.6f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f}", core::csv_field(pose.robot_name),
         pose.keyframe.valid() ? std::to_string(pose.keyframe.index) : "", pose.stamp, body.translation.x(),
         body.translation.y(), body.translation.z(), q.x(), q.y(), q.z(), q.w());
 

@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "plumbline/core/text.hpp"
+
 namespace plumbline::exports {
 
 core::Result<geometry::Rigid3> body_from_camera_of(const ExportOptions& options) {
@@ -34,7 +36,9 @@ core::Result<std::vector<std::vector<ExportPose>>> paths_of(const MapSource& sou
 }
 
 std::string robot_comment(const std::vector<ExportPose>& path) {
-  return path.front().robot_name.empty() ? "" : fmt::format("# robot {}\n", path.front().robot_name);
+  return path.front().robot_name.empty()
+             ? ""
+             : fmt::format("# robot {}\n", core::printable(path.front().robot_name));
 }
 
 core::Result<ExportSummary> write_robot_files(const MapSource& source, const std::filesystem::path& output,
@@ -54,7 +58,8 @@ core::Result<ExportSummary> write_robot_files(const MapSource& source, const std
 
   for (const auto& path : *paths) {
     const std::string& robot = path.front().robot_name;
-    const std::filesystem::path file = output / ((robot.empty() ? source.name() : robot) + ending);
+    const std::filesystem::path file =
+        output / (core::folder_name(robot.empty() ? source.name() : robot) + ending);
     core::OutputFile out(file);
     write(out, {path});
     if (auto written = out.commit(); !written) return tl::unexpected(written.error());

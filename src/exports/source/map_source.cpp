@@ -20,6 +20,7 @@
 #include "plumbline/core/text.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/maps/frame_pose.hpp"
+#include "plumbline/maps/unfinished_run.hpp"
 
 namespace plumbline::exports {
 namespace {
@@ -45,6 +46,7 @@ bool is_component(const maps::MapPlace& place) {
 
 /// A map that never joined the rest of its run: files in a folder of its own below components/.
 std::optional<maps::MapPlace> find_component(const fs::path& input) {
+  if (input.empty()) return std::nullopt;
   fs::path folder = fs::absolute(input).lexically_normal();
   if (!folder.has_filename()) folder = folder.parent_path();
 
@@ -200,7 +202,8 @@ core::Result<void> MapSource::level_interrupted() {
 
   whole_ = std::move(file);
   log_->info(
-      fmt::format("{}: the run was interrupted; {}", place_.store.string(),
+      fmt::format("{}: the run {}; {}", place_.store.string(),
+                  maps::is_running(place_.store.parent_path()) ? "is still going on" : "was interrupted",
                   upright_ ? "its floor was found now" : "no floor is seen: the frame of its first camera"));
   return {};
 }
@@ -252,7 +255,8 @@ std::string MapSource::name() const {
   const fs::path& input = request_->input;
   std::string name = (input.has_filename() ? input : input.parent_path()).filename().string();
   if (name == maps::kStoreFile) name = fs::absolute(input).parent_path().filename().string();
-  return name.empty() || name == "." ? fs::absolute(input).parent_path().filename().string() : name;
+  if (name.empty() || name == ".") name = fs::absolute(input).parent_path().filename().string();
+  return core::printable(name);
 }
 
 core::Result<const maps::StoredRun*> MapSource::store(const std::string& what) const {
@@ -375,7 +379,8 @@ core::Result<std::vector<ExportPose>> MapSource::written_poses(bool keyframes_on
   std::vector<ExportPose> all;
   const auto folders = place_.result->robot_folders();
   for (std::size_t robot = 0; robot < folders.size(); ++robot) {
-    const std::string name = folders.size() > 1 ? folders[robot].filename().string() : "";
+    const std::string name =
+        folders[robot] != place_.result->folder ? folders[robot].filename().string() : "";
     const auto poses =
         dataset::read_trajectory(folders[robot] / (keyframes_only ? "keyframes.txt" : "trajectory.txt"));
     if (!poses) return tl::unexpected(poses.error());

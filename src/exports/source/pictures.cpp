@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "plumbline/core/config.hpp"
+#include "plumbline/core/text.hpp"
 #include "plumbline/dataset/jpeg.hpp"
 
 namespace plumbline::exports {
@@ -264,7 +265,7 @@ core::Result<std::vector<Picture>> pictures_of(const MapSource& source, const Pi
     Picture picture;
     picture.pose = pose;
     const std::string number = fmt::format("{:06d}", ++numbers[pose.robot]);
-    picture.name = pose.robot_name.empty() ? number : pose.robot_name + "_" + number;
+    picture.name = pose.robot_name.empty() ? number : core::folder_name(pose.robot_name) + "_" + number;
     if (pictures != nullptr) picture.frame = pictures->find(pose.robot, pose.stamp);
     all.push_back(std::move(picture));
   }

@@ -16,7 +16,7 @@ class ChainOption {
   explicit ChainOption(const std::string& file);
 
   void declare(core::OptionTable& table, const std::string& help) {
-    table.text_or_list("filters", value_, "filters", help);
+    table.text_or_list("filters", value_, "filters", help, core::EmptyValue::kAllowed);
   }
   /// Reads the chain; its problems are reported among those of the pipeline, each in the file it stands in;
   /// so are files that its filters need and do not find. From then on the option's value is the list with

@@ -116,6 +116,7 @@ core::Result<MapRequest> in_order(MapRequest request) {
   std::vector<Input> inputs;
   request.others.push_back(request.input);
   for (const std::string& given : request.others) {
+    if (given.empty()) return core::usage_error("the path of a recording is empty");
     std::error_code ec;
     const std::filesystem::path folder = std::filesystem::weakly_canonical(given, ec);
     inputs.push_back({folder.filename().string(), folder.string(), given});
@@ -336,6 +337,7 @@ class MapRun {
 
     // A live camera ends by itself on request, and all frames that arrived are mapped.
     context.stop = source_->live() && request_.live == nullptr ? core::StopToken() : stop;
+    context.asked = stop;
     context.output_folder = output_->path();
     context.input.source = source_.get();
     context.input.recordings = source_.get();

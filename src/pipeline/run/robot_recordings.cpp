@@ -10,6 +10,8 @@
 #include <tuple>
 #include <utility>
 
+#include "plumbline/core/text.hpp"
+
 namespace plumbline::pipeline {
 
 RobotRecordings::RobotRecordings(std::vector<std::unique_ptr<dataset::FrameSource>> recordings)
@@ -27,10 +29,10 @@ RobotRecordings::RobotRecordings(std::vector<std::unique_ptr<dataset::FrameSourc
   for (const auto& recording : recordings_) {
     RobotInfo robot;
     robot.number = static_cast<std::int32_t>(robots_.size());
-    robot.name = recording->name();
+    const std::string name = core::folder_name(recording->name());
+    robot.name = name;
 
-    for (int i = 2; !taken.insert(robot.name).second; ++i)
-      robot.name = fmt::format("{}-{}", recording->name(), i);
+    for (int i = 2; !taken.insert(robot.name).second; ++i) robot.name = fmt::format("{}-{}", name, i);
     robot.camera = recording->camera();
     name_ += (name_.empty() ? "" : " ") + robot.name;
     robots_.push_back(std::move(robot));

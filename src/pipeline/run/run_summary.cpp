@@ -10,6 +10,8 @@
 #include <cstdio>
 #include <limits>
 
+#include "plumbline/core/csv.hpp"
+#include "plumbline/core/json.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/core/version.hpp"
 #include "summary/sections.hpp"
@@ -164,7 +166,7 @@ RunSummary summary_of(const Graph& graph, const RunReport& report, const RunFact
   summary["trustworthy"] = result.reason.empty();
   summary["reason"] = result.reason;
   // Names of files need not be UTF-8: replace what JSON cannot hold.
-  result.json = summary.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  result.json = core::json_text(summary);
   result.text = text_of(summary);
   return result;
 }
@@ -176,7 +178,7 @@ core::Result<void> write_timing(const std::filesystem::path& file, const Graph& 
   for (const StageTiming& stage : report.stages) columns.push_back(&stage);
   for (const StageTiming& part : parts) columns.push_back(&part);
   std::string text = "frame,stamp";
-  for (const StageTiming* column : columns) text += "," + column->name + "_ms";
+  for (const StageTiming* column : columns) text += "," + core::csv_field(column->name + "_ms");
   text += ",rss_mb\n";
 
   for (std::size_t f = 0; f < report.frames; ++f) {

@@ -17,7 +17,7 @@ namespace {
 class FilterStage : public Stage {
  public:
   void declare(core::OptionTable& table) override {
-    filters_.declare(table, "Filter chain: a file, or the filters themselves");
+    filters_.declare(table, "Filter chain: a file, or the filters themselves; empty: none");
   }
   void check(const CheckContext& context, const core::ConfigMark& /*mark*/, const std::string& path,
              core::ConfigProblems& problems) override {

@@ -12,6 +12,7 @@
 #include "options/exports_option.hpp"
 #include "plumbline/cloud/fusion/dense_fusion.hpp"
 #include "plumbline/cloud/io/cloud_io.hpp"
+#include "plumbline/core/csv.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
@@ -37,7 +38,8 @@ class OutputStage : public Stage {
                   "Number of coarser clouds in levels/, each with twice the voxel size of the previous one");
     table.boolean("lines", lines_, "Write lines.ply, the 3D line landmarks");
     table.text("views", views_,
-               "Pictures in snapshots/: any of iso top bottom front back left right; empty: none");
+               "Pictures in snapshots/: any of iso top bottom front back left right; empty: none",
+               core::EmptyValue::kAllowed);
     table.integer("width", width_px_, {64, 8192}, "px", "Width of the pictures");
     table.integer("height", height_px_, {64, 8192}, "px", "Height of the pictures");
     exports_.declare(table);
@@ -202,9 +204,15 @@ class OutputStage : public Stage {
     return {};
   }
 
-  /// Several robots: each in its own folder.
-  static core::Result<void> write_trajectories(const std::filesystem::path& folder, const MapResult& map) {
-    if (map.robots.size() < 2) {
+  /// True if the run was given several robots, even if one alone is in the map.
+  [[nodiscard]] bool several() const {
+    return context_->input.robots != nullptr && context_->input.robots->size() > 1;
+  }
+
+  /// Several robots: each that is in the map in its own folder.
+  [[nodiscard]] core::Result<void> write_trajectories(const std::filesystem::path& folder,
+                                                      const MapResult& map) const {
+    if (!several()) {
       auto written = dataset::write_trajectory(folder / "trajectory.txt", map.trajectory);
       return written ? dataset::write_trajectory(folder / "keyframes.txt", maps::trajectory(map.keyframes))
                      : written;
@@ -237,8 +245,8 @@ class OutputStage : public Stage {
       const Eigen::Vector3d& t = keyframe.world_from_camera.translation;
       const Eigen::Quaterniond q = keyframe.world_from_camera.quaternion();
       out.write(fmt::format("{},{},{:.6f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},",
-                            names[keyframe.id.robot], keyframe.id.index, keyframe.stamp, t.x(), t.y(), t.z(),
-                            q.x(), q.y(), q.z(), q.w()));
+                            core::csv_field(names[keyframe.id.robot]), keyframe.id.index, keyframe.stamp,
+                            t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()));
       const std::vector<mapping::KeyframeAccuracy>& all = map.accuracy.keyframes;
       const auto* known = all.empty() ? nullptr : &all[i];
       out.write(known ? fmt::format("{},{},{},{},{}\n", sigma_cell(known->sigma_position_m(), 6),

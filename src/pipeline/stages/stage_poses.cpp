@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "plumbline/core/csv.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
@@ -21,7 +22,8 @@ class PosesStage : public Stage {
   void declare(core::OptionTable& table) override {
     table.text("file", file_,
                "Poses in TUM format (stamp tx ty tz qx qy qz qw); {robot} in the name stands for each "
-               "robot's name; empty: the recordings' own truth");
+               "robot's name; empty: the recordings' own truth",
+               core::EmptyValue::kAllowed);
     table.number("max_gap", max_gap_s_, {0.0, 10.0}, "s",
                  "Poses are interpolated; frames further than this from the nearest pose have none");
     table.number("keyframe_distance", keyframe_distance_m_, {0.0, 10.0}, "m", "Distance between keyframes");
@@ -50,7 +52,8 @@ class PosesStage : public Stage {
     const RobotInfo& robot = recordings_->robot(recordings_->robot_of(io.frame()));
     Way& way = ways_[static_cast<std::size_t>(robot.number)];
     const std::optional<geometry::Rigid3> pose = geometry::pose_at(way.poses, frame->stamp, max_gap_s_);
-    const std::string stamp = fmt::format("{}{:.6f}", several() ? robot.name + "," : "", frame->stamp);
+    const std::string stamp =
+        fmt::format("{}{:.6f}", several() ? core::csv_field(robot.name) + "," : "", frame->stamp);
     if (!pose) {
       map_.frames.push_back({io.frame(), "lost", stamp + ","});
       return {};

@@ -28,6 +28,7 @@ class ReadStage : public Stage {
   core::Result<void> start(const RunContext& context) override {
     source_ = context.input.source;
     log_ = context.log;
+    asked_ = &context.asked;
     if (source_ == nullptr || (source_->size() == 0 && !source_->live()))
       return core::input_error("the recording has no frames");
     if (context.resumed != nullptr) {
@@ -61,8 +62,13 @@ class ReadStage : public Stage {
   }
 
   core::Result<void> finish(StageIo& io) override {
-    if (io.frame() == 0)
-      return core::input_error("stopped before the first frame was mapped; nothing is written");
+    if (io.frame() == 0) {
+      return asked_->stop_requested()
+                 ? core::failure(core::ErrorKind::kStopped,
+                                 "stopped before the first frame was mapped; nothing is written")
+                 : core::input_error(
+                       fmt::format("{}: ended before its first frame; nothing is written", source_->name()));
+    }
     if (unreadable_ > kReportedOneByOne) {
       log_->warning(
           fmt::format("{} of {} frames could not be read and were skipped", unreadable_.load(), io.frame()));
@@ -90,6 +96,7 @@ class ReadStage : public Stage {
  private:
   const dataset::FrameSource* source_ = nullptr;
   core::Log* log_ = nullptr;
+  const core::StopToken* asked_ = nullptr;
   std::size_t resumed_ = 0;
   std::atomic<std::size_t> read_{0};
   std::atomic<std::size_t> unreadable_{0};

@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "plumbline/core/csv.hpp"
 #include "plumbline/mapping/slam.hpp"
 #include "plumbline/pipeline/observer.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
@@ -168,8 +169,8 @@ class TrackStage : public Stage {
 
   void note(std::size_t frame, const RobotInfo& robot, const mapping::FrameReport& report) {
     const std::string columns = row_columns(report);
-    rows_.push_back(
-        {frame, tracking::to_string(report.state), several() ? robot.name + "," + columns : columns});
+    rows_.push_back({frame, tracking::to_string(report.state),
+                     several() ? core::csv_field(robot.name) + "," + columns : columns});
     if (report.keyframe.valid()) ++causes_[report.decision.cause];
     if (report.component.valid()) ++component_frames_[report.component];
 

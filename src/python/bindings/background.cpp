@@ -5,6 +5,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "plumbline/core/shortage.hpp"
+#include "plumbline/core/text.hpp"
 
 namespace plumbline::python {
 namespace {
@@ -32,7 +33,7 @@ const char* level_name(core::LogLevel level) {
 
 void QueueLog::write(core::LogLevel level, const std::string& message) {
   const std::lock_guard lock(mutex_);
-  lines_.emplace_back(level_name(level), message);
+  lines_.emplace_back(level_name(level), core::printable(message));
 }
 
 std::vector<LogLine> QueueLog::take() {

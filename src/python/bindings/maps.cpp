@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "background.hpp"
 #include "bindings.hpp"
 #include "plumbline/core/config.hpp"
+#include "plumbline/core/json.hpp"
+#include "plumbline/core/text.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/features/frame_features.hpp"
 #include "plumbline/maps/fusion_state.hpp"
@@ -37,7 +40,7 @@ py::array_t<double> read_lines(const fs::path& file) {
 
 std::map<std::int32_t, std::string> names_of(const std::vector<maps::RobotInfo>& robots) {
   std::map<std::int32_t, std::string> names;
-  for (const maps::RobotInfo& robot : robots) names[robot.number] = robot.name;
+  for (const maps::RobotInfo& robot : robots) names[robot.number] = core::printable(robot.name);
   return names;
 }
 
@@ -140,6 +143,9 @@ py::object pose_covariances(const fs::path& folder, const std::string& robot,
   return owned(std::move(values), {static_cast<py::ssize_t>(times.size()), 6, 6});
 }
 
+/// The text of a file, which is JSON within the limits of core::read_json.
+std::string read_json(const fs::path& file) { return core::json_text(value_of(core::read_json(file))); }
+
 std::vector<fs::path> robot_folders(const fs::path& folder) {
   return value_of(maps::open_result(folder)).robot_folders();
 }
@@ -155,6 +161,7 @@ void add_maps(py::module_& module) {
   module.def("pose_covariances", &pose_covariances, py::arg("folder"), py::arg("robot"), py::arg("stamps"),
              py::arg("poses"));
   module.def("run_settings", &run_settings, py::arg("file"));
+  module.def("read_json", &read_json, py::arg("file"));
   module.def("robot_folders", &robot_folders, py::arg("folder"));
 }
 

@@ -25,6 +25,7 @@ void add_errors(py::module_& module) {
                               : kind == core::ErrorKind::kInput         ? input
                               : kind == core::ErrorKind::kUntrustworthy ? untrustworthy
                               : kind == core::ErrorKind::kOutput        ? output
+                              : kind == core::ErrorKind::kStopped       ? base
                                                                         : internal;
       PyErr_SetString(type.ptr(), failure.what());
     }

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._paths import pipelines
-from ._values import PathLike, nested
+from ._values import PathLike, nested, path_of
 
 
 class FilterReport(NamedTuple):
@@ -52,11 +52,11 @@ class Cloud:
     @classmethod
     def read(cls, file: PathLike) -> "Cloud":
         """Reads PLY, PCD, XYZ or CSV. Raises InputError."""
-        return cls(_core.PointCloud.read(os.fspath(file)))
+        return cls(_core.PointCloud.read(path_of(file, "file")))
 
     def write(self, file: PathLike) -> None:
         """Writes .ply or .pcd, binary, with all columns. Raises ConfigError (another ending), OutputError."""
-        self._core.write(os.fspath(file))
+        self._core.write(path_of(file, "file"))
 
     def to_ply(self, file: PathLike) -> None:
         """The same as write, for a name that ends in .ply."""
@@ -125,7 +125,7 @@ def cloud_of(given: object) -> Cloud:
     own = getattr(given, "cloud", None)
     if isinstance(own, Cloud):
         return own
-    path = os.fspath(given)  # type: ignore[call-overload]
+    path = path_of(given, "cloud")  # type: ignore[arg-type]
     return Cloud.read(os.path.join(path, "map.ply") if os.path.isdir(path) else path)
 
 
@@ -140,7 +140,7 @@ def filter(  # noqa: A001, the program's name for it
     Raises ConfigError with every mistake of the chain. What each filter did is in `.reports`.
     """
     if isinstance(chain, str) or hasattr(chain, "__fspath__"):
-        text, is_yaml = os.fspath(chain), False
+        text, is_yaml = path_of(chain, "chain"), False
     else:
         text, is_yaml = nested(list(chain)), True
     result, reports = cloud_of(cloud)._core.filter(text, is_yaml, pipelines() / "filters", threads)

@@ -16,13 +16,13 @@ from ._cloud import Cloud, CloudLike, cloud_of
 from ._paths import pipelines
 from ._result import Result
 from ._trajectory import TrajectoryLike, trajectory_of
-from ._values import PathLike, option_texts, tell
+from ._values import PathLike, option_texts, path_of, tell
 
 MapLike = Union[Result, PathLike]
 
 
 def _path(given: MapLike) -> str:
-    return os.fspath(given.folder if isinstance(given, Result) else given)
+    return os.fspath(given.folder) if isinstance(given, Result) else path_of(given, "map")
 
 
 class Report(Dict[str, Any]):
@@ -46,7 +46,7 @@ def evaluate_trajectory(
 
     Raises InputError (no overlap in time, fewer than 3 poses), ConfigError.
     """
-    if isinstance(truth, (str, os.PathLike)) and (Path(truth) / "groundtruth.txt").exists():
+    if isinstance(truth, (str, os.PathLike)) and path_of(truth, "truth") and (Path(truth) / "groundtruth.txt").exists():
         truth = Path(truth) / "groundtruth.txt"
     path, true_path = trajectory_of(estimate), trajectory_of(truth)
     text, stamps, errors = _core.evaluate_trajectory(
@@ -75,7 +75,7 @@ def evaluate_cloud(
     surface = os.fspath(reference)
     if os.path.isdir(surface):
         surface = os.path.join(surface, "reference.ply")
-    pairs = [(os.fspath(a), os.fspath(b)) for a, b in paths or []]
+    pairs = [(path_of(a, "paths"), path_of(b, "paths")) for a, b in paths or []]
     text, errors = _core.evaluate_cloud(
         measured.points, measured.shift.tolist(), measured.normals, surface, pairs, option_texts(options), threads
     )
@@ -101,7 +101,7 @@ def export(
     options  of the format: voxel="1 cm", resolution="5 cm", box=[0, 0, 0, 2, 2, 2] ...
     """
     written, notes = _core.write_export(
-        _path(map), os.fspath(output), format, what, option_texts(options), pipelines(), force, threads
+        _path(map), path_of(output, "output"), format, what, option_texts(options), pipelines(), force, threads
     )
     tell(("INFO", note) for note in notes)
     return [Path(file) for file in written]
@@ -132,7 +132,7 @@ def render(
             map.write(source)
         else:
             source = _path(map)
-        picture = os.path.join(folder, "picture.png") if file is None else os.fspath(file)
+        picture = os.path.join(folder, "picture.png") if file is None else path_of(file, "file")
         texts = option_texts(dict(options, view=view, color=color, width=size[0], height=size[1]))
         image = _core.render(source, title or Path(source).stem, lines, texts, picture)
     return np.ascontiguousarray(image[:, :, 2::-1])

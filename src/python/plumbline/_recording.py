@@ -14,7 +14,7 @@ from . import _core
 from ._core import Camera
 from ._paths import pipelines
 from ._trajectory import Trajectory
-from ._values import PathLike, tell
+from ._values import PathLike, path_of, tell
 
 
 def camera(name_or_file: PathLike) -> Camera:
@@ -22,7 +22,7 @@ def camera(name_or_file: PathLike) -> Camera:
 
     Raises ConfigError: no such camera, or not one, with the place in the file.
     """
-    return Camera._find(os.fspath(name_or_file), pipelines() / "cameras")
+    return Camera._find(path_of(name_or_file, "name_or_file"), pipelines() / "cameras")
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,8 @@ def open(  # noqa: A001, as in gzip.open
     Raises InputError (not there, not a recording), ConfigError (camera, format). Warnings go to the logger "plumbline".
     """
     core = _core.open(
-        os.fspath(input), pipelines(), os.fspath(camera), format, start, end, every, poses, threads, dict(topics or {})
+        path_of(input, "input"), pipelines(), os.fspath(camera), format, start, end, every, poses, threads,
+        dict(topics or {}),
     )
     tell(core.messages())
     return Recording(core, raw)

@@ -18,7 +18,7 @@ from ._cloud import Cloud
 from ._core import Camera
 from ._recording import Frame, Recording, open as open_recording
 from ._trajectory import Trajectory
-from ._values import PathLike
+from ._values import PathLike, path_of
 
 
 class Keyframes(NamedTuple):
@@ -74,6 +74,11 @@ def _matrices(*columns: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     return np.moveaxis(np.array(rows), 2, 0).copy()
 
 
+def _name(field: str) -> str:
+    """The text of a field of our tables: names that a spreadsheet would take for a formula have an apostrophe in front."""
+    return field[1:] if field.startswith("'") else field
+
+
 class Result:
     """A result folder. Each part is read when it is first used.
 
@@ -81,7 +86,7 @@ class Result:
     """
 
     def __init__(self, folder: PathLike, _kept: Optional["TemporaryDirectory[str]"] = None) -> None:
-        self.folder = Path(folder)
+        self.folder = Path(path_of(folder, "folder"))
         self._recordings: Dict[str, Recording] = {}
         self._kept = _kept  # a Mapper's own folder lives as long as its result
         self._robot_folders  # raises InputError: not a result
@@ -92,8 +97,7 @@ class Result:
     @functools.cached_property
     def summary(self) -> Dict[str, Any]:
         """summary.json: counts, times, memory, evidence."""
-        with open(self.folder / "summary.json", encoding="utf-8") as file:
-            return dict(json.load(file))
+        return dict(json.loads(_core.read_json(self.folder / "summary.json")))
 
     @property
     def reason(self) -> str:
@@ -138,8 +142,18 @@ class Result:
 
     @functools.cached_property
     def keyframes(self) -> Keyframes:
-        with open(self.folder / "keyframes.csv", encoding="utf-8", newline="") as file:
-            rows = list(csv.DictReader(file))
+        file = self.folder / "keyframes.csv"
+        try:
+            # Earlier versions wrote names as they were.
+            with open(file, encoding="utf-8", errors="replace", newline="") as table:
+                rows = list(csv.DictReader(table))
+            return self._keyframes_of(rows)
+        except OSError as problem:
+            raise _core.InputError(f"{file}: cannot be read: {problem.strerror}") from problem
+        except (csv.Error, KeyError, TypeError, ValueError) as problem:
+            raise _core.InputError(f"{file}: is damaged: a row does not fit the columns; map again") from problem
+
+    def _keyframes_of(self, rows: List[Dict[str, str]]) -> Keyframes:
         known: Dict[Tuple[str, int], int] = {}
         if (self.folder / "map.db").exists():
             known = _core.keyframe_frames(self.folder)
@@ -148,7 +162,7 @@ class Result:
             return np.array([float(row[name]) if row[name] else np.nan for row in rows], np.float64)
 
         poses = _matrices(*(column(name) for name in ("tx", "ty", "tz", "qx", "qy", "qz", "qw")))
-        names = [(row["robot"], int(row["keyframe"])) for row in rows]
+        names = [(_name(row["robot"]), int(row["keyframe"])) for row in rows]
         return Keyframes(
             column("stamp"), poses, np.array([number for _, number in names], np.int32),
             np.array([known.get(name, -1) for name in names], np.int64),
@@ -190,6 +204,8 @@ class Result:
         if len(known) > 1 and robot not in known:
             raise _core.InputError(f"{self.folder}: no robot {robot!r}; give one of them: {', '.join(known)}")
 
+        if not robot and len(known) == 1 and self._robot_folders[0] != self.folder:
+            robot = known[0]  # of several, the one that is in the map
         names = [str(entry["name"]) for entry in self.summary.get("robots", [])]
         number = names.index(robot) + 1 if robot in names else 1
         run = _core.run_settings(self.folder / "config.yaml")
@@ -216,4 +232,4 @@ def _seconds(text: str) -> float:
 
 def load(folder: PathLike) -> Result:
     """Opens the result folder of an earlier run. Raises InputError: there is none."""
-    return Result(os.fspath(folder))
+    return Result(folder)

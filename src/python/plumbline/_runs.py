@@ -16,7 +16,7 @@ from ._core import Camera
 from ._paths import pipelines
 from ._recording import camera as find_camera
 from ._result import Result
-from ._values import PathLike, overrides, tell
+from ._values import PathLike, overrides, path_of, tell
 
 Progress = Callable[[int, int], None]
 _LOOK_UP = 0.05  # seconds between two checks for signals and messages
@@ -52,8 +52,8 @@ def _finish(run: _core.Background, progress: Optional[Progress] = None) -> None:
 
 def _files(given: Union[PathLike, Sequence[PathLike]]) -> List[str]:
     if isinstance(given, (str, os.PathLike)):
-        return [os.fspath(given)]
-    return [os.fspath(one) for one in given]
+        return [path_of(given, "recording")]
+    return [path_of(one, "recording") for one in given]
 
 
 def map(  # noqa: A001, the program's name for it
@@ -84,8 +84,8 @@ def map(  # noqa: A001, the program's name for it
     KeyboardInterrupt is raised. Raises ConfigError, InputError, OutputError as the program's exit codes 2, 3, 5.
     """
     run = _core.start_map(
-        _files(recording), os.fspath(output), os.fspath(pipeline), overrides(options), pipelines(), os.fspath(camera),
-        format, start, end, every, poses, dict(topics or {}), threads, force, resume,
+        _files(recording), path_of(output, "output"), path_of(pipeline, "pipeline"), overrides(options), pipelines(),
+        os.fspath(camera), format, start, end, every, poses, dict(topics or {}), threads, force, resume,
     )
     _finish(run, progress)
     return Result(output)
@@ -106,9 +106,10 @@ def fuse(
 
     anchor  robot whose map defines the frame; "": the one with the largest map
     """
-    folders = [os.fspath(one.folder if isinstance(one, Result) else one) for one in maps]
+    folders = [os.fspath(one.folder) if isinstance(one, Result) else path_of(one, "maps") for one in maps]
     run = _core.start_fuse(
-        folders, os.fspath(output), os.fspath(pipeline), overrides(options), pipelines(), anchor, threads, force
+        folders, path_of(output, "output"), path_of(pipeline, "pipeline"), overrides(options), pipelines(), anchor,
+        threads, force,
     )
     _finish(run, progress)
     return Result(output)
@@ -192,7 +193,7 @@ class Mapper:
         if queue < 1:
             raise _core.ConfigError(f"queue: {queue} is out of range (allowed: at least 1)")
         self._temporary = TemporaryDirectory(prefix="plumbline-") if output is None else None
-        self._output = Path(self._temporary.name) / name if self._temporary else Path(os.fspath(output or ""))
+        self._output = Path(self._temporary.name) / name if self._temporary else Path(path_of(output or "", "output"))
         self._queue = queue
         self._drop_late = drop_late
         self._result: Optional[Result] = None
@@ -201,7 +202,7 @@ class Mapper:
         self.fed = 0
         known = camera if isinstance(camera, Camera) else find_camera(camera)
         self._run = _core.MapperRun(
-            known, self._output, os.fspath(pipeline), overrides(options), pipelines(), name, threads, force
+            known, self._output, path_of(pipeline, "pipeline"), overrides(options), pipelines(), name, threads, force
         )
 
     def feed(

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._values import PathLike
+from ._values import PathLike, path_of
 
 
 class Trajectory:
@@ -33,14 +33,14 @@ class Trajectory:
     @classmethod
     def read(cls, file: PathLike) -> "Trajectory":
         """Reads a file in TUM, EuRoC or KITTI format, or a result folder's trajectory.txt. Raises InputError."""
-        path = os.fspath(file)
+        path = path_of(file, "file")
         if os.path.isdir(path):
             path = os.path.join(path, "trajectory.txt")
         return cls(*_core.read_trajectory(path))
 
     def write(self, file: PathLike) -> None:
         """Writes TUM format. Raises OutputError."""
-        _core.write_trajectory(os.fspath(file), self.stamps, self.poses)
+        _core.write_trajectory(path_of(file, "file"), self.stamps, self.poses)
 
     @property
     def positions(self) -> npt.NDArray[np.float64]:

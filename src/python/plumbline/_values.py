@@ -7,8 +7,18 @@ import logging
 import os
 from typing import Any, Dict, Iterable, List, Mapping, Tuple, Union
 
+from . import _core
+
 PathLike = Union[str, "os.PathLike[str]"]
 log = logging.getLogger("plumbline")
+
+
+def path_of(given: PathLike, argument: str) -> str:
+    """The path as text. Raises ConfigError if it is empty: mostly a variable that was not set."""
+    path = os.fspath(given)
+    if not path:
+        raise _core.ConfigError(f"{argument}: is empty; give a path")
+    return path
 
 
 def text_of(value: Any) -> str:
