@@ -15,10 +15,12 @@
 #include <system_error>
 #include <utility>
 
+#include "empty_values.hpp"
 #include "paths.hpp"
 #include "plumbline/cloud/filters/filter_plugin.hpp"
 #include "plumbline/core/shortage.hpp"
 #include "terminal/help.hpp"
+#include "terminal/print.hpp"
 #include "terminal/signals.hpp"
 #include "terminal/version_text.hpp"
 
@@ -27,7 +29,8 @@ namespace {
 
 const char* const kFooter =
     "Exit codes: 0 done, 1 a bug, 2 usage or configuration, 3 input data, 4 done but not trustworthy,\n"
-    "5 output cannot be written or memory is short. More about a command: plumbline COMMAND --help";
+    "5 output cannot be written or memory is short, 130 stopped before there was anything to write.\n"
+    "More about a command: plumbline COMMAND --help";
 
 /// The exit code `code`, unless standard output cannot be written, of which `cause` is the errno if it is
 /// known: it is buffered, and what is lost may show only at the end. A reader that closes its pipe wants no
@@ -45,6 +48,7 @@ int check_standard_output(Session& session, int code, int cause = 0) {
 
 /// The exit code of the command that was named.
 int run_command(Session& session) {
+  std::cerr.rdbuf(nullptr);  // OpenCV and VTK write there what the console says with the name of the file
   ignore_write_signals();
   cv::setNumThreads(1);                                     // threads come from the executor alone
   pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // the step that called PCL reports failures
@@ -96,12 +100,11 @@ const core::Executor& Session::executor() {
 }
 
 int Session::fail(const core::Error& error) {
-  // Several problems are printed on separate lines, so that an editor can follow file:line:column. Lines that
-  // are indented belong to the one above.
-  std::size_t problems = 1;
-  for (std::size_t i = 1; i < error.message.size(); ++i)
-    problems += error.message[i - 1] == '\n' && error.message[i] != ' ' ? 1 : 0;
-  console().error(problems > 1 ? fmt::format("{} problems\n{}", problems, error.message) : error.message);
+  if (error.listed) {
+    console().problems(error);
+  } else {
+    console().error(error.message);
+  }
   return static_cast<int>(error.kind);
 }
 
@@ -119,7 +122,7 @@ core::Result<void> Session::equip(pipeline::RunRequest& request) {
 int Session::finish(const core::Result<pipeline::RunSummary>& summary, const std::filesystem::path& output) {
   console().end_progress();
   if (!summary) return fail(summary.error());
-  if (!quiet) fmt::print("{}written    {}\n", summary->text, output.string());
+  if (!quiet) print("{}written    {}\n", summary->text, output.string());
   if (summary->reason.empty()) return 0;
   console().warning("the result is not trustworthy: " + summary->reason);
   return static_cast<int>(core::ErrorKind::kUntrustworthy);
@@ -241,8 +244,11 @@ int run(int argc, char** argv) {
                          add_filter, add_pipelines, add_play, add_completion}) {
     add(app, session);
   }
+  refuse_empty_values(app);
 
   try {
+    if (const std::string name = empty_assignment(app, argc, argv); !name.empty())
+      throw CLI::ValidationError(name, kEmptyValue);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) {  // --help, --version

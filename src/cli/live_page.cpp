@@ -19,6 +19,7 @@ core::Result<std::unique_ptr<net::LiveMap>> live_map(const PageAddress& page,
   if (page.http.empty()) return nullptr;
   const auto options = net::page_server_options(page.http, page.token);
   if (!options) return tl::unexpected(options.error());
+  if (const std::string warning = net::open_to_others(*options); !warning.empty()) console.warning(warning);
   auto live = net::LiveMap::start(*options, output);
   if (live) console.info("the map is shown at " + (*live)->address());
   return live;

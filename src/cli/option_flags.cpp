@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "empty_values.hpp"
+
 namespace plumbline::cli {
 namespace {
 
@@ -60,7 +62,8 @@ void OptionFlags::add_flags() {
     const bool shows_default = !spec.default_value.empty() && spec.default_value != "\"\"";
     const std::string help =
         shows_default ? fmt::format("{} (default: {})", spec.help, spec.default_value) : spec.help;
-    command_->add_option(flag_name(spec.key), help)->type_name(value_name(spec));
+    CLI::Option* flag = command_->add_option(flag_name(spec.key), help)->type_name(value_name(spec));
+    if (spec.empty == core::EmptyValue::kAllowed) may_be_empty(flag);
   }
 }
 

@@ -208,7 +208,7 @@ core::Result<Camera> camera_in(core::Result<ConfigNode> root, const std::filesys
   LensKeys lens;
   core::OptionTable table;
   declare_pinhole(table, camera.color);
-  table.text("name", camera.name, "Name of the camera");
+  table.text("name", camera.name, "Name of the camera; empty: the file's name", core::EmptyValue::kAllowed);
   lens.declare(table);
   table.number("depth_scale", camera.depth_scale, {1e-3, 1e7}, "", "Raw depth units per metre");
   table.number("fps", camera.fps, {1e-3, 1e4}, "", "Pairs a second");

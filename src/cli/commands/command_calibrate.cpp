@@ -17,6 +17,7 @@
 #include "plumbline/maps/output_check.hpp"
 #include "plumbline/pipeline/input.hpp"
 #include "plumbline/sensor/camera_file.hpp"
+#include "terminal/print.hpp"
 
 namespace plumbline::cli {
 namespace {
@@ -115,15 +116,14 @@ class Mapped {
   std::vector<std::unique_ptr<mapping::Slam>> runs_;
 };
 
-void print(const mapping::CameraCalibration& calibration) {
-  fmt::print("{} views, {} observations of points\n", calibration.views, calibration.observations);
-  fmt::print("{:<14} {:>10} {:>10} {:>9} {:>7}\n", "", "given", "found", "+-", "gain");
+void print_calibration(const mapping::CameraCalibration& calibration) {
+  print("{} views, {} observations of points\n", calibration.views, calibration.observations);
+  print("{:<14} {:>10} {:>10} {:>9} {:>7}\n", "", "given", "found", "+-", "gain");
   for (const mapping::CameraFinding& f : calibration.findings) {
-    fmt::print("{:<14} {:>10.5g} {:>10.5g} {:>9.2g} {:>6.1f}% {}\n", f.name, f.given, f.found, f.sigma,
-               100.0 * f.gain, f.used ? "used" : "not used");
+    print("{:<14} {:>10.5g} {:>10.5g} {:>9.2g} {:>6.1f}% {}\n", f.name, f.given, f.found, f.sigma,
+          100.0 * f.gain, f.used ? "used" : "not used");
   }
-  fmt::print("held-out parts of the recordings fit {:.1f} % better with this camera\n",
-             100.0 * calibration.gain);
+  print("held-out parts of the recordings fit {:.1f} % better with this camera\n", 100.0 * calibration.gain);
 }
 
 /// Reports a problem with the output before anything is read.
@@ -159,16 +159,16 @@ core::Result<void> calibrate(const CalibrateRequest& request, Session& session) 
   const auto calibration =
       mapping::calibrate_camera(mapped.runs(), mapped.camera(), request.options, session.executor());
   if (!calibration) return tl::unexpected<core::Error>(calibration.error());
-  if (!session.quiet) print(*calibration);
+  if (!session.quiet) print_calibration(*calibration);
 
   const auto& findings = calibration->findings;
   const bool any = std::any_of(findings.begin(), findings.end(), [](const auto& f) { return f.used; });
-  if (!any && !session.quiet) fmt::print("the given camera fits; nothing better was found\n");
+  if (!any && !session.quiet) print("the given camera fits; nothing better was found\n");
 
   if (request.output.empty()) return {};
   const std::string yaml = "# found by plumbline calibrate\n" + sensor::to_yaml(calibration->camera);
   if (auto written = core::write_file(request.output, yaml); !written) return written;
-  if (!session.quiet) fmt::print("written        {}\n", request.output.string());
+  if (!session.quiet) print("written        {}\n", request.output.string());
   return {};
 }
 

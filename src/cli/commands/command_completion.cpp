@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "app.hpp"
+#include "empty_values.hpp"
 #include "plumbline/core/config.hpp"
 #include "plumbline/core/options.hpp"
 #include "plumbline/core/output_file.hpp"
@@ -16,6 +17,7 @@
 #include "plumbline/pipeline/reference.hpp"
 #include "reference/completion.hpp"
 #include "reference/man_page.hpp"
+#include "terminal/print.hpp"
 
 namespace plumbline::cli {
 namespace {
@@ -149,7 +151,7 @@ int complete_line(const CompleteRequest& request, const CLI::App& app, const Ses
   const char* const paths = completion.paths == Completion::Paths::kFiles     ? "files"
                             : completion.paths == Completion::Paths::kFolders ? "folders"
                                                                               : "none";
-  fmt::print("{}{}\n", paths, completion.open ? " open" : "");
+  print("{}{}\n", paths, completion.open ? " open" : "");
 
   // In "track.loops=o" bash completes only what follows the last word break.
   const std::string last = words.empty() ? "" : words.back();
@@ -157,7 +159,7 @@ int complete_line(const CompleteRequest& request, const CLI::App& app, const Ses
   const std::size_t before = split ? last.size() - request.word.size() : 0;
   for (const Candidate& candidate : completion.candidates) {
     const std::string help = candidate.help.substr(0, candidate.help.find('\n'));
-    fmt::print("{}\t{}\n", candidate.word.substr(std::min(before, candidate.word.size())), help);
+    print("{}\t{}\n", candidate.word.substr(std::min(before, candidate.word.size())), help);
   }
   return 0;
 }
@@ -190,7 +192,7 @@ core::Result<void> man(const ManRequest& request, const CLI::App& app) {
     if (command != nullptr) continue;
     return core::usage_error(fmt::format("there is no command '{}'; plumbline --help lists them", word));
   }
-  fmt::print("{}", man_page(*command, program));
+  print("{}", man_page(*command, program));
   return {};
 }
 
@@ -208,9 +210,9 @@ void add_complete(CLI::App& app, Session& session) {
   const auto request = std::make_shared<CompleteRequest>();
   CLI::App* command = app.add_subcommand("complete", "Used by the scripts of `plumbline completion`");
   command->group("");  // called by shells, not shown in --help
-  command->add_option("--line", request->line);
-  command->add_option("--word", request->word);
-  command->add_option("WORDS", request->words);
+  may_be_empty(command->add_option("--line", request->line));
+  may_be_empty(command->add_option("--word", request->word));
+  may_be_empty(command->add_option("WORDS", request->words));
   command->callback([request, &app, &session] {
     session.command = [request, &app, &session] { return complete_line(*request, app, session); };
   });
@@ -225,7 +227,7 @@ void add_completion(CLI::App& app, Session& session) {
                                   [shell]() -> core::Result<void> {
                                     const auto script = completion_script(*shell);
                                     if (!script) return tl::unexpected<core::Error>(script.error());
-                                    fmt::print("{}", *script);
+                                    print("{}", *script);
                                     return {};
                                   });
 

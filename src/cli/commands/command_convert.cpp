@@ -10,6 +10,7 @@
 #include "app.hpp"
 #include "plumbline/dataset/convert.hpp"
 #include "plumbline/pipeline/input.hpp"
+#include "terminal/print.hpp"
 #include "terminal/signals.hpp"
 
 namespace plumbline::cli {
@@ -70,7 +71,7 @@ core::Result<void> convert(Session& session, ConvertRequest& request) {
   if (summary->stopped) console.warning("stopped: the copy ends here");
   if (summary->unreadable > 0)
     console.warning(fmt::format("{} frames cannot be read and are left out", summary->unreadable));
-  if (!session.quiet) fmt::print("written    {} frames to {}\n", summary->written, request.output.string());
+  if (!session.quiet) print("written    {} frames to {}\n", summary->written, request.output.string());
   return {};
 }
 

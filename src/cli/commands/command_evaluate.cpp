@@ -19,6 +19,7 @@
 #include "plumbline/evaluate/trajectory.hpp"
 #include "plumbline/maps/result_folder.hpp"
 #include "plumbline/viz/trajectory_plots.hpp"
+#include "terminal/print.hpp"
 
 namespace plumbline::cli {
 namespace {
@@ -67,9 +68,9 @@ core::Result<void> write_plots(const std::vector<evaluate::NamedReport>& reports
   return viz::write_trajectory_plots(comparisons, folder);
 }
 
-/// The error with the file in front that it is about.
-tl::unexpected<core::Error> about(const fs::path& file, core::Error error) {
-  error.message = fmt::format("{}: {}", file.string(), error.message);
+/// The error with both files in front, for it may be about either.
+tl::unexpected<core::Error> about(const fs::path& estimate, const fs::path& truth, core::Error error) {
+  error.message = fmt::format("{} against {}: {}", estimate.string(), truth.string(), error.message);
   return tl::unexpected<core::Error>(std::move(error));
 }
 
@@ -80,7 +81,7 @@ core::Result<dataset::TrajectoryReading> read_estimate(const fs::path& given) {
   if (file == given || fs::exists(file, ignored)) return dataset::read_trajectory_file(file);
 
   const std::vector<fs::path> robots = maps::ResultFolder{given}.robot_folders();
-  if (robots.front() == given) return dataset::read_trajectory_file(file);
+  if (robots.size() == 1) return dataset::read_trajectory_file(robots.front() / "trajectory.txt");
   return core::input_error(
       fmt::format("{}: has a path for each of its {} robots; name one of them, such as {}", given.string(),
                   robots.size(), robots.front().string()));
@@ -157,13 +158,13 @@ core::Result<std::vector<evaluate::NamedReport>> measure_paths(const TrajectoryR
 
     dataset::TrajectoryReading fitting_truth = *truth;
     if (auto paired = dataset::pair_by_number(*estimate, fitting_truth); !paired)
-      return about(file, paired.error());
+      return about(file, truth_file, paired.error());
 
     for (const std::string& note : estimate->notes)
       console.warning(fmt::format("{}: {}", file.string(), note));
     auto report =
         evaluate::evaluate_trajectory(estimate->poses, fitting_truth.poses, request.options, stamps);
-    if (!report) return about(file, report.error());
+    if (!report) return about(file, truth_file, report.error());
     evaluate::TrajectoryOptions of_components = request.options;
     if (report->body && report->body->removed)  // too short to fit it to
       of_components.body = evaluate::body_text(report->body->body_from_camera);
@@ -187,13 +188,13 @@ core::Result<void> evaluate_paths(TrajectoryRequest& request, Console& console) 
       }
       continue;
     }
-    fmt::print("{}{}\n", single ? "" : "== " + named.name + "\n", evaluate::to_text(named.report));
+    print("{}{}\n", single ? "" : "== " + named.name + "\n", evaluate::to_text(named.report));
   }
 
   if (request.json) {
-    fmt::print("{}", single ? evaluate::to_json(reports->front().report) : evaluate::to_json(*reports));
+    print("{}", single ? evaluate::to_json(reports->front().report) : evaluate::to_json(*reports));
   } else if (!single) {
-    fmt::print("{}", evaluate::to_text(*reports));
+    print("{}", evaluate::to_text(*reports));
   }
 
   return request.plots.empty() ? core::Result<void>{} : write_plots(*reports, request.plots);

@@ -13,6 +13,7 @@
 #include "plumbline/evaluate/cloud.hpp"
 #include "plumbline/evaluate/companions.hpp"
 #include "plumbline/maps/result_folder.hpp"
+#include "terminal/print.hpp"
 
 namespace plumbline::cli {
 namespace {
@@ -144,7 +145,7 @@ core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
     for (const std::string& warning : report->warnings) session.console().warning(warning);
   }
 
-  fmt::print("{}", request.json ? evaluate::to_json(*report) : evaluate::to_text(*report));
+  print("{}", request.json ? evaluate::to_json(*report) : evaluate::to_text(*report));
   if (!request.output.empty()) {
     auto done = write_error_clouds(*cloud, *reference, *report, pairs, request.output);
     if (!done) return done;

@@ -11,6 +11,7 @@
 #include "plumbline/maps/output_check.hpp"
 #include "plumbline/maps/stored_run.hpp"
 #include "recording_opener.hpp"
+#include "terminal/print.hpp"
 #include "terminal/silenced_stdio.hpp"
 
 namespace plumbline::cli {
@@ -55,7 +56,7 @@ core::Result<void> export_keyframes(const ExportCommand& command) {
 
 core::Result<void> run_export(ExportCommand& command, Session& session) {
   if (command.page) {
-    fmt::print("{}", exports::exports_page());
+    print("{}", exports::exports_page());
     return {};
   }
 

@@ -16,6 +16,7 @@
 #include "plumbline/core/text.hpp"
 #include "plumbline/maps/output_check.hpp"
 #include "plumbline/maps/result_folder.hpp"
+#include "terminal/print.hpp"
 
 namespace plumbline::cli {
 namespace {
@@ -137,8 +138,8 @@ core::Result<void> filter(const FilterRequest& request, Session& session) {
 
   console.end_progress();
   if (!filtered) return tl::unexpected<core::Error>(filtered.error());
-  if (!session.quiet) fmt::print("{}", cloud::to_table(reports));
-  if (!session.quiet && !context.shift.isZero(0.0)) fmt::print("shift: {}\n", shift_text(context.shift));
+  if (!session.quiet) print("{}", cloud::to_table(reports));
+  if (!session.quiet && !context.shift.isZero(0.0)) print("shift: {}\n", shift_text(context.shift));
   auto written = cloud::write_cloud(output, **filtered, columns, context.shift, frame.comments());
   if (!written) return written;
 
@@ -149,7 +150,7 @@ int list_filters(Session& session) {
   const auto registry = session.filters();
   if (!registry) return session.fail(registry.error());
   for (const cloud::FilterInfo& info : registry->filters()) {
-    fmt::print("{:<24} {}\n", info.type, info.summary);
+    print("{:<24} {}\n", info.type, info.summary);
   }
   return 0;
 }
@@ -158,7 +159,7 @@ core::Result<void> describe_filter(const std::string& name, const Session& sessi
   const auto registry = session.filters();
   if (!registry) return tl::unexpected<core::Error>(registry.error());
   if (name.empty()) {
-    fmt::print("{}", cloud::filters_reference(*registry));
+    print("{}", cloud::filters_reference(*registry));
     return {};
   }
 
@@ -168,15 +169,15 @@ core::Result<void> describe_filter(const std::string& name, const Session& sessi
         fmt::format("there is no filter '{}'{}", name, cloud::missing_filter_hint(name, *registry)));
   }
 
-  fmt::print("{}: {}\n\n{}\n\noptions:\n", info->type, info->summary, info->details);
+  print("{}: {}\n\n{}\n\noptions:\n", info->type, info->summary, info->details);
   core::OptionTable table;
   const auto made = info->make();
   made->declare(table);
   for (const core::OptionSpec& spec : table.specs()) {
-    fmt::print("  {:<20} {} (default: {})\n", spec.key, spec.help, spec.default_value);
+    print("  {:<20} {} (default: {})\n", spec.key, spec.help, spec.default_value);
   }
 
-  fmt::print("\nexample:\n{}\n", info->example);
+  print("\nexample:\n{}\n", info->example);
   return {};
 }
 
@@ -215,7 +216,7 @@ void add_filter(CLI::App& app, Session& session) {
       add_command(*group, session, "check", "Check a filter chain without running it", [&session, name] {
         const auto chain = load_chain(*name, session);
         if (!chain) return session.fail(chain.error());
-        fmt::print("{}: {} filters, nothing wrong\n", *name, chain->size());
+        print("{}: {} filters, nothing wrong\n", *name, chain->size());
         return 0;
       });
 

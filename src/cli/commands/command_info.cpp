@@ -5,16 +5,14 @@
 #include <pcl/point_types.h>
 
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <system_error>
 #include <vector>
 
 #include "app.hpp"
 #include "plumbline/cloud/io/cloud_io.hpp"
+#include "plumbline/core/json.hpp"
 #include "plumbline/dataset/bag.hpp"
 #include "plumbline/dataset/live.hpp"
 #include "plumbline/dataset/recording_poses.hpp"
@@ -24,6 +22,8 @@
 #include "plumbline/net/ros2.hpp"
 #include "plumbline/pipeline/input.hpp"
 #include "plumbline/synth/source.hpp"
+#include "result_page.hpp"
+#include "terminal/print.hpp"
 #include "terminal/signals.hpp"
 
 namespace plumbline::cli {
@@ -32,17 +32,8 @@ namespace {
 struct InfoRequest {
   std::string input;
   dataset::OpenOptions open;
+  bool json = false;
 };
-
-void print_json(const nlohmann::ordered_json& json, const std::string& prefix) {
-  for (const auto& [key, value] : json.items()) {
-    if (value.is_object()) {
-      print_json(value, prefix + key + ".");
-    } else {
-      fmt::print("{}{}: {}\n", prefix, key, value.is_string() ? value.get<std::string>() : value.dump());
-    }
-  }
-}
 
 core::Result<void> describe_store(const std::filesystem::path& file) {
   const auto reader = maps::StoreReader::open(file);
@@ -56,35 +47,30 @@ core::Result<void> describe_store(const std::filesystem::path& file) {
   std::error_code ec;
   const double file_mb = static_cast<double>(std::filesystem::file_size(file, ec)) / 1e6;
 
-  fmt::print("store: {}\nstore.format: {}\nstore.program: plumbline {}\nstore.robot: {}\n", file.string(),
-             header.format, header.program_version, robots);
-  fmt::print("store.complete: {}\n",
-             contents->complete ? "yes" : "no; map --resume continues it, export and render read it");
-  fmt::print("store.keyframes: {}\nstore.points: {}\nstore.lines: {}\n", contents->keyframes,
-             contents->points, contents->lines);
-  fmt::print("store.surface_edges: {}\nstore.loops: {}\nstore.frames: {}\n", contents->edges, contents->loops,
-             contents->frames);
-  fmt::print("store.clouds: {} of keyframes, {} of frames between\n", contents->keyframe_clouds,
-             contents->frame_clouds);
+  print("store: {}\nstore.format: {}\nstore.program: plumbline {}\nstore.robot: {}\n", file.string(),
+        header.format, header.program_version, robots);
+  print("store.complete: {}\n",
+        contents->complete ? "yes" : "no; map --resume continues it, export and render read it");
+  print("store.keyframes: {}\nstore.points: {}\nstore.lines: {}\n", contents->keyframes, contents->points,
+        contents->lines);
+  print("store.surface_edges: {}\nstore.loops: {}\nstore.frames: {}\n", contents->edges, contents->loops,
+        contents->frames);
+  print("store.clouds: {} of keyframes, {} of frames between\n", contents->keyframe_clouds,
+        contents->frame_clouds);
 
-  for (const std::string& name : contents->attachments) fmt::print("store.attachment: {}\n", name);
-  fmt::print("store.size_mb: {:.1f}\nstore.clouds_mb: {:.1f}\n", file_mb,
-             static_cast<double>(contents->cloud_bytes) / 1e6);
+  for (const std::string& name : contents->attachments) print("store.attachment: {}\n", name);
+  print("store.size_mb: {:.1f}\nstore.clouds_mb: {:.1f}\n", file_mb,
+        static_cast<double>(contents->cloud_bytes) / 1e6);
   return {};
 }
 
-core::Result<void> describe_result(const std::filesystem::path& folder) {
-  std::ifstream stream(folder / "summary.json");
-  const auto json = nlohmann::ordered_json::parse(stream, nullptr, false);
-  if (!stream.is_open()) {
-    return core::input_error(
-        fmt::format("{}: cannot be read: no permission", (folder / "summary.json").string()));
-  }
-  if (!json.is_object()) {
-    return core::input_error(
-        fmt::format("{}: is not valid JSON; map again", (folder / "summary.json").string()));
-  }
-  print_json(json, "");
+core::Result<void> describe_result(const std::filesystem::path& folder, bool json) {
+  const std::filesystem::path file = folder / "summary.json";
+  const auto summary = core::read_json(file);
+  if (!summary) return core::input_error(summary.error().message + "; map again");
+  if (!summary->is_object())
+    return core::input_error(fmt::format("{}: holds no object of JSON; map again", file.string()));
+  print("{}", json ? core::json_text(*summary) : result_page(*summary));
   return {};
 }
 
@@ -102,31 +88,33 @@ core::Result<void> describe_cloud(const std::filesystem::path& file) {
   }
 
   if (read->cloud->empty()) {
-    fmt::print("points: 0\nnote: the cloud is empty\n");
+    print("points: 0\nnote: the cloud is empty\n");
     return {};
   }
 
-  fmt::print("points: {}\nwithout position: {}\n", read->cloud->size(), read->nan_points);
-  if (read->cloud->isOrganized()) fmt::print("organised: {} x {}\n", read->cloud->width, read->cloud->height);
-  fmt::print("colour: {}\nnormals: {}\n", read->has_color ? "yes" : "no", read->has_normals ? "yes" : "no");
-  if (read->has_normals) fmt::print("without normal: {}\n", read->nan_normals);
-  if (!read->shift.isZero(0.0)) fmt::print("shift: {}\n", shift_text(read->shift));
+  print("points: {}\nwithout position: {}\n", read->cloud->size(), read->nan_points);
+  if (read->cloud->isOrganized()) print("organised: {} x {}\n", read->cloud->width, read->cloud->height);
+  print("colour: {}\nnormals: {}\n", read->has_color ? "yes" : "no", read->has_normals ? "yes" : "no");
+  if (read->has_normals) print("without normal: {}\n", read->nan_normals);
+  if (!read->shift.isZero(0.0)) print("shift: {}\n", shift_text(read->shift));
 
   if ((low <= high).all()) {
     const Eigen::Array3d from = low.cast<double>() + read->shift.array();
     const Eigen::Array3d to = high.cast<double>() + read->shift.array();
-    fmt::print("from: {:.3f} {:.3f} {:.3f} m\nto: {:.3f} {:.3f} {:.3f} m\n", from.x(), from.y(), from.z(),
-               to.x(), to.y(), to.z());
+    print("from: {:.3f} {:.3f} {:.3f} m\nto: {:.3f} {:.3f} {:.3f} m\n", from.x(), from.y(), from.z(), to.x(),
+          to.y(), to.z());
     const Eigen::Array3f size = high - low;
-    fmt::print("size: {:.3f} x {:.3f} x {:.3f} m\n", size.x(), size.y(), size.z());
+    print("size: {:.3f} x {:.3f} x {:.3f} m\n", size.x(), size.y(), size.z());
   }
 
   return {};
 }
 
-core::Result<void> describe_map(const maps::MapPlace& place) {
+core::Result<void> describe_map(const maps::MapPlace& place, bool json) {
+  if (json && !place.result)
+    return core::usage_error(fmt::format("--json: {} has no summary.json yet", place.store.string()));
   if (place.result) {
-    if (auto described = describe_result(place.result->folder); !described) return described;
+    if (auto described = describe_result(place.result->folder, json); !described || json) return described;
   }
   return place.store.empty() ? core::Result<void>() : describe_store(place.store);
 }
@@ -142,10 +130,10 @@ void describe_path(const dataset::TrajectoryReading& reading) {
   for (std::size_t i = 1; i < path.size(); ++i) {
     length_m += (path[i].world_from_camera.translation - path[i - 1].world_from_camera.translation).norm();
   }
-  fmt::print("poses: {}\n", path.size());
-  if (reading.stamped) fmt::print("from: {:.6f} s\nto: {:.6f} s\n", path.front().stamp, path.back().stamp);
-  fmt::print("length: {:.3f} m\nformat: {}\n", length_m, reading.format);
-  for (const std::string& note : reading.notes) fmt::print("note: {}\n", note);
+  print("poses: {}\n", path.size());
+  if (reading.stamped) print("from: {:.6f} s\nto: {:.6f} s\n", path.front().stamp, path.back().stamp);
+  print("length: {:.3f} m\nformat: {}\n", length_m, reading.format);
+  for (const std::string& note : reading.notes) print("note: {}\n", note);
 }
 
 core::Result<void> describe_recording(Session& session, InfoRequest& request) {
@@ -155,7 +143,7 @@ core::Result<void> describe_recording(Session& session, InfoRequest& request) {
   const auto source = pipeline::open_input(request.input, request.open, *pipelines / "scenes",
                                            session.executor(), session.console());
   if (!source) return tl::unexpected<core::Error>(source.error());
-  fmt::print("{}", dataset::to_text(**source));
+  print("{}", dataset::to_text(**source));
   return {};
 }
 
@@ -163,7 +151,7 @@ core::Result<void> describe_recording(Session& session, InfoRequest& request) {
 core::Result<void> describe_bag(Session& session, InfoRequest& request) {
   const auto topics = dataset::bag_to_text(request.input, request.open.topics);
   if (!topics) return tl::unexpected<core::Error>(topics.error());
-  fmt::print("{}", *topics);
+  print("{}", *topics);
   return describe_recording(session, request);
 }
 
@@ -173,18 +161,21 @@ core::Result<void> describe_live(InfoRequest& request) {
   request.open.live.stop = stop_on_signals();
   const auto text = dataset::live_to_text(request.input, **stream, request.open);
   if (!text) return tl::unexpected<core::Error>(text.error());
-  fmt::print("{}", *text);
+  print("{}", *text);
   return {};
 }
 
 core::Result<void> info(Session& session, InfoRequest& request) {
-  if (dataset::is_live_address(request.input)) return describe_live(request);
-  if (synth::is_synth_url(request.input)) return describe_recording(session, request);
-
   std::error_code ec;
   const std::filesystem::path path = request.input;
   const auto map = maps::find_map(path);  // also of a run that was interrupted and has left no `path`
-  if (map) return describe_map(*map);
+  if (request.json && !map)
+    return core::usage_error(
+        "--json: is for results of plumbline map and fuse, whose summary.json it prints");
+  if (dataset::is_live_address(request.input)) return describe_live(request);
+  if (synth::is_synth_url(request.input)) return describe_recording(session, request);
+
+  if (map) return describe_map(*map, request.json);
   if (!std::filesystem::exists(path, ec)) {
     return core::input_error(fmt::format("{}: no such map, cloud or recording", request.input));
   }
@@ -216,6 +207,7 @@ void add_info(CLI::App& app, Session& session) {
   add_topic_option(*command, request->open);
   command->add_option("--format", request->open.format, "Layout of the recording (default: auto)")
       ->check(CLI::IsMember(dataset::layout_names()));
+  command->add_flag("--json", request->json, "Print all that a result's summary.json says, as JSON");
 }
 
 }  // namespace plumbline::cli

@@ -8,6 +8,7 @@
 
 #include "app.hpp"
 #include "plumbline/net/keys.hpp"
+#include "terminal/print.hpp"
 
 namespace plumbline::cli {
 namespace {
@@ -24,7 +25,7 @@ void add_action(CLI::App& group, Session& session, const char* name, const char*
   CLI::App* command = add_command(group, session, name, help, [&session, request, action, then] {
     const auto done = action(request->folder, request->robots);
     if (!done) return session.fail(done.error());
-    if (!session.quiet) fmt::print("{}: {}\n", request->folder.string(), then);
+    if (!session.quiet) print("{}: {}\n", request->folder.string(), then);
     return 0;
   });
   command->add_option("DIR", request->folder, "Folder of the keys")->required();

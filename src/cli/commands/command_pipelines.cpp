@@ -12,6 +12,7 @@
 #include "plumbline/pipeline/graph.hpp"
 #include "plumbline/pipeline/reference.hpp"
 #include "plumbline/viz/graph_picture.hpp"
+#include "terminal/print.hpp"
 
 namespace plumbline::cli {
 namespace {
@@ -55,49 +56,48 @@ core::Result<pipeline::StageTypePtr> find_stage(const std::string& name,
 int list(Session& session, const PipelinesRequest& /*request*/, const pipeline::StageRegistry& registry) {
   const auto folder = session.pipelines_folder();
   if (!folder) return session.fail(folder.error());
-  fmt::print("pipelines:\n");
+  print("pipelines:\n");
   for (const std::string& name : core::yaml_names(*folder)) {
     const auto graph = load({name, {}, {}, false, false}, registry, session);
-    fmt::print("  {:<14} {}\n", name, graph ? graph->description : "(broken) " + graph.error().message);
+    print("  {:<14} {}\n", name, graph ? graph->description : "(broken) " + graph.error().message);
   }
-  fmt::print("stages:\n");
-  for (const pipeline::StageTypePtr& type : registry.types())
-    fmt::print("  {:<14} {}\n", type->name, type->help);
+  print("stages:\n");
+  for (const pipeline::StageTypePtr& type : registry.types()) print("  {:<14} {}\n", type->name, type->help);
   return 0;
 }
 
 void describe_ports(const std::vector<pipeline::Port>& ports, const char* title) {
   if (ports.empty()) return;
-  fmt::print("\n{}:\n", title);
+  print("\n{}:\n", title);
   for (const pipeline::Port& port : ports) {
-    fmt::print("  {:<22} {}, {}{}\n", port.name, port.type.name,
-               port.type.rate == pipeline::Rate::kFrame ? "each frame" : "once, at the end",
-               port.required ? "" : "; may be left open");
+    print("  {:<22} {}, {}{}\n", port.name, port.type.name,
+          port.type.rate == pipeline::Rate::kFrame ? "each frame" : "once, at the end",
+          port.required ? "" : "; may be left open");
   }
 }
 
 int describe(Session& session, const PipelinesRequest& request, const pipeline::StageRegistry& registry) {
   if (request.name.empty()) {
-    fmt::print("{}", pipeline::stages_reference(registry, request.all));
+    print("{}", pipeline::stages_reference(registry, request.all));
     return 0;
   }
 
   const auto type = find_stage(request.name, registry);
   if (!type) return session.fail(type.error());
   if (request.markdown) {
-    fmt::print("{}", pipeline::stage_reference(**type, request.all));
+    print("{}", pipeline::stage_reference(**type, request.all));
     return 0;
   }
 
-  fmt::print("{}: {}\n", (*type)->name, (*type)->help);
+  print("{}: {}\n", (*type)->name, (*type)->help);
   describe_ports((*type)->inputs, "inputs");
   describe_ports((*type)->outputs, "outputs");
   const std::vector<core::OptionSpec> options = pipeline::shown_options(**type, request.all);
-  if (!options.empty()) fmt::print("\noptions:\n");
+  if (!options.empty()) print("\noptions:\n");
 
   for (const core::OptionSpec& spec : options) {
-    fmt::print("  {:<22} {} (allowed: {}; default: {})\n", spec.key, spec.help, core::allowed_text(spec),
-               spec.default_value);
+    print("  {:<22} {} (allowed: {}; default: {})\n", spec.key, spec.help, core::allowed_text(spec),
+          spec.default_value);
   }
 
   return 0;
@@ -106,19 +106,19 @@ int describe(Session& session, const PipelinesRequest& request, const pipeline::
 int check(Session& session, const PipelinesRequest& request, const pipeline::StageRegistry& registry) {
   const auto graph = load(request, registry, session);
   if (!graph) return session.fail(graph.error());
-  fmt::print("{}: {} stages, nothing wrong\n", request.name, graph->stage_count());
-  if (session.verbose) fmt::print("{}", pipeline::to_yaml(*graph));
+  print("{}: {} stages, nothing wrong\n", request.name, graph->stage_count());
+  if (session.verbose) print("{}", pipeline::to_yaml(*graph));
   return 0;
 }
 
 int schema(Session& session, const PipelinesRequest& request, const pipeline::StageRegistry& registry) {
   if (request.name.empty()) {
-    fmt::print("{}", pipeline::pipeline_schema(registry));
+    print("{}", pipeline::pipeline_schema(registry));
     return 0;
   }
   const auto type = find_stage(request.name, registry);
   if (!type) return session.fail(type.error());
-  fmt::print("{}", pipeline::stage_schema(**type, registry));
+  print("{}", pipeline::stage_schema(**type, registry));
   return 0;
 }
 
@@ -127,7 +127,7 @@ int graph(Session& session, const PipelinesRequest& request, const pipeline::Sta
   if (!loaded) return session.fail(loaded.error());
   const std::string dot = pipeline::to_dot(*loaded);
   if (request.output.empty()) {
-    fmt::print("{}", dot);
+    print("{}", dot);
     return 0;
   }
   const bool as_text = request.output.extension() == ".dot";
@@ -148,7 +148,7 @@ void add_chain_schema(CLI::App& filters, Session& session) {
       add_command(filters, session, "schema", "JSON Schema of filter chains, for editors", [&session] {
         const auto known = session.filters();
         if (!known) return session.fail(known.error());
-        fmt::print("{}", cloud::filter_chain_schema(*known));
+        print("{}", cloud::filter_chain_schema(*known));
         return 0;
       });
   add_plugin_option(*command, session);

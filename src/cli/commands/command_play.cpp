@@ -9,6 +9,7 @@
 #include "plumbline/dataset/play.hpp"
 #include "plumbline/net/ros2.hpp"
 #include "plumbline/pipeline/input.hpp"
+#include "terminal/print.hpp"
 #include "terminal/signals.hpp"
 
 namespace plumbline::cli {
@@ -51,8 +52,8 @@ core::Result<void> play(Session& session, PlayRequest& request) {
   if (summary->unreadable > 0)
     console.warning(fmt::format("{} frames cannot be read and were left out", summary->unreadable));
   if (!session.quiet)
-    fmt::print("published  {} frames, none later than {:.0f} ms after it was due\n", summary->published,
-               summary->late_s * 1000.0);
+    print("published  {} frames, none later than {:.0f} ms after it was due\n", summary->published,
+          summary->late_s * 1000.0);
   return {};
 }
 

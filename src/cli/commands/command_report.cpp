@@ -6,6 +6,7 @@
 
 #include "app.hpp"
 #include "plumbline/report/report.hpp"
+#include "terminal/print.hpp"
 
 namespace plumbline::cli {
 namespace {
@@ -15,7 +16,7 @@ int report(Session& session, const report::ReportRequest& request) {
   if (!done) return session.fail(done.error());
   for (const std::string& line : done->missing) session.console().warning(line);
   if (!session.quiet) {
-    fmt::print("written    {} ({:.1f} MB)\n", done->file.string(), static_cast<double>(done->bytes) / 1e6);
+    print("written    {} ({:.1f} MB)\n", done->file.string(), static_cast<double>(done->bytes) / 1e6);
   }
   return 0;
 }

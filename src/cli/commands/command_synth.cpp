@@ -9,6 +9,7 @@
 #include "option_flags.hpp"
 #include "plumbline/synth/recording.hpp"
 #include "plumbline/synth/scene.hpp"
+#include "terminal/print.hpp"
 #include "terminal/signals.hpp"
 
 namespace plumbline::cli {
@@ -43,9 +44,9 @@ core::Result<void> film(SynthRequest& request, Session& session) {
   if (!summary) return tl::unexpected<core::Error>(summary.error());
 
   if (!session.quiet) {
-    fmt::print("{}{} robots, {} frames, {:.1f} m of path, {} reference points in {}\n",
-               summary->stopped ? "stopped early: " : "", summary->robots, summary->frames, summary->path_m,
-               summary->reference_samples, request.output.string());
+    print("{}{} robots, {} frames, {:.1f} m of path, {} reference points in {}\n",
+          summary->stopped ? "stopped early: " : "", summary->robots, summary->frames, summary->path_m,
+          summary->reference_samples, request.output.string());
   }
 
   return {};

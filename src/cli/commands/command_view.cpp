@@ -12,6 +12,7 @@
 #include "plumbline/net/page_server.hpp"
 #include "plumbline/viewer/page.hpp"
 #include "recording_opener.hpp"
+#include "terminal/print.hpp"
 
 namespace plumbline::cli {
 namespace {
@@ -28,6 +29,7 @@ core::Result<void> run_view(ViewCommand& command, Session& session) {
   if (!options) return tl::unexpected<core::Error>(options.error());
   if (auto free = net::check_listening(*options); !free) return free;
   Console& console = session.console();
+  if (const std::string warning = net::open_to_others(*options); !warning.empty()) console.warning(warning);
   command.request.open = recording_opener(session);
   exports::ExportRequest other = command.request;
   other.input = command.other;
@@ -45,11 +47,12 @@ core::Result<void> run_view(ViewCommand& command, Session& session) {
   sigemptyset(&ends);
   sigaddset(&ends, SIGINT);
   sigaddset(&ends, SIGTERM);
+  sigaddset(&ends, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &ends, nullptr);
 
   auto server = net::PageServer::start(*options, viewer::page(view->scene, exports::kViewGenerator));
   if (!server) return tl::unexpected<core::Error>(server.error());
-  fmt::print("{}\n", server->address());
+  print("{}\n", server->address());
   std::fflush(stdout);
   int signal = 0;
   sigwait(&ends, &signal);

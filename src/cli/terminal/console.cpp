@@ -10,6 +10,9 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "plumbline/core/json.hpp"
+#include "plumbline/core/text.hpp"
+
 namespace plumbline::cli {
 namespace {
 
@@ -63,7 +66,15 @@ void Console::write(core::LogLevel level, const std::string& message) {
   if (level < threshold_) return;
   const std::lock_guard<std::mutex> lock(mutex_);
   clear_bar();
-  put(fmt::format("plumbline: {}{}\n", label(level), message));
+  put(fmt::format("plumbline: {}{}\n", label(level), core::printable(message)));
+}
+
+void Console::problems(const core::Error& error) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  clear_bar();
+  const auto ends = std::count(error.message.begin(), error.message.end(), '\n');
+  put(fmt::format("plumbline: error: {} problems\n{}\n", ends + 1,
+                  core::printable(error.message, core::Lines::kKept)));
 }
 
 void Console::progress(std::size_t done, std::size_t total, const char* what) {
@@ -102,7 +113,7 @@ void Console::put_line(std::size_t done, std::size_t total, const char* what, do
                                      {"total", total},      {"per_second", rate}, {"seconds_left", left_s},
                                      {"seconds", elapsed_s}};
     if (total == 0) object["total"] = object["seconds_left"] = nullptr;  // not known for live sources
-    put(object.dump() + "\n");
+    put(core::json_text(object, -1) + "\n");
     return;
   }
   put(fmt::format("plumbline: {} of {} {}{}, {} left{}\n", done, total, what,
@@ -114,7 +125,7 @@ void Console::step(const std::string& name) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (style_ == ProgressStyle::kJson) {
     const nlohmann::ordered_json object = {{"event", "step"}, {"what", name}};
-    put(object.dump() + "\n");
+    put(core::json_text(object, -1) + "\n");
   } else if (terminal_) {
     clear_bar();
     put(fmt::format("finishing: {}", name));
@@ -130,7 +141,7 @@ void Console::status(const std::string& line) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (style_ == ProgressStyle::kJson) return;
   if (started_) {
-    note_ = "  " + line;
+    note_ = "  " + core::printable(line);
     return;
   }
   const auto now = Clock::now();
@@ -138,7 +149,7 @@ void Console::status(const std::string& line) {
   if (since_last_s < (terminal_ ? kBarEvery_s : kLineEvery_s)) return;
   last_ = now;
   clear_bar();
-  put(terminal_ ? line : fmt::format("plumbline: {}\n", line));
+  put(terminal_ ? core::printable(line) : fmt::format("plumbline: {}\n", core::printable(line)));
   bar_shown_ = terminal_;
 }
 

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <string>
 
+#include "plumbline/core/error.hpp"
 #include "plumbline/core/log.hpp"
 
 namespace plumbline::cli {
@@ -26,6 +27,8 @@ class Console : public core::Log {
 
   void write(core::LogLevel level, const std::string& message) override;
 
+  /// Several problems on separate lines, so that an editor can follow file:line:column.
+  void problems(const core::Error& error);
   /// Shows a bar with rate and time left on a terminal, a line every few seconds elsewhere, or one object per
   /// second as JSON; nothing when quiet. `total` 0: not known.
   void progress(std::size_t done, std::size_t total, const char* what);

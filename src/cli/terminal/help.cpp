@@ -20,6 +20,7 @@ std::string plain_type(std::string type) {
       {std::regex(":FLOAT \\[TIME\\]"), ""},
       {std::regex(":NONNEGATIVE"), " (0 or more)"},
       {std::regex(":POSITIVE"), " (above 0)"},
+      {std::regex(":may be empty"), " (may be empty)"},
       {std::regex("^U?INT\\b"), "N"},
       {std::regex("^FLOAT\\b"), "NUMBER"}};
   for (const auto& [pattern, plain] : rules) type = std::regex_replace(type, pattern, plain);

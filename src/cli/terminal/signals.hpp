@@ -5,8 +5,8 @@
 
 namespace plumbline::cli {
 
-/// After this call the first Ctrl-C (or SIGTERM) requests an orderly end of the run; the second ends the
-/// program.
+/// After this call the first Ctrl-C (or SIGTERM, or SIGHUP of a closed terminal) requests an orderly end of
+/// the run; the second ends the program.
 const core::StopToken& stop_on_signals();
 
 /// Turns the signal of a full disk or a closed pipe into an error of the write, which can be reported.

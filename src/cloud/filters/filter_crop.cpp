@@ -52,7 +52,8 @@ class PassThroughFilter : public Filter {
     table.text(
         "column", column_,
         "Instead of field: a further column of the file by its name, such as confidence, observations, robot "
-        "or intensity; empty: field");
+        "or intensity; empty: field",
+        core::EmptyValue::kAllowed);
     table.number("min", min_, {-1e9, 1e9}, "",
                  "Smallest value to keep, in the field's own unit (metres for x, y, z)");
     table.number("max", max_, {-1e9, 1e9}, "", "Largest value to keep");

@@ -142,7 +142,8 @@ void read_root(const ConfigNode& root, Scene& scene, ConfigProblems& problems) {
   std::string events, motion = "handheld";
   core::OptionTable table;
   table.text("name", scene.name, "Name");
-  table.text("description", scene.description, "Description of the scene");
+  table.text("description", scene.description, "Description of the scene; empty: none",
+             core::EmptyValue::kAllowed);
   table.number("ambient", scene.ambient, {0.0, 1.0}, "", "Share of light without direction");
   table.choice("motion", motion, {"handheld", "wheeled"}, "Motion of the cameras");
   table.text("events", events, "Difficult moments, like the option of the same name");

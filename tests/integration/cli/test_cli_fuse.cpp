@@ -141,6 +141,26 @@ TEST_F(Fuse, WorldsThatDoNotConnectStayApart) {
   EXPECT_EQ(shown.code, 4) << shown;
   EXPECT_TRUE(shown.told("a and b cannot be aligned")) << shown;
   EXPECT_FALSE(fs::exists(path("both.html")));
+
+  // The layout is that of several robots, though one alone is in the map.
+  EXPECT_FALSE(fs::exists(path("ab/trajectory.txt")));
+  EXPECT_NE(fs::exists(path("ab/robots/a/trajectory.txt")), fs::exists(path("ab/robots/b/trajectory.txt")));
+
+  const Outcome mapped =
+      run("map room/robot0 other/robot0 -o both --set output.views=top" + std::string(kLean));
+  EXPECT_EQ(mapped.code, 4) << mapped;
+  EXPECT_FALSE(fs::exists(path("both/trajectory.txt")));
+  const bool first = fs::exists(path("both/robots/robot0/trajectory.txt"));
+  EXPECT_NE(first, fs::exists(path("both/robots/robot0-2/trajectory.txt")));
+  const std::string name = first ? "robot0" : "robot0-2";
+  EXPECT_EQ(slurp(path("both/keyframes.csv")).find("\n" + name + ",0,") != std::string::npos, true);
+
+  const Outcome report = run("report both");
+  EXPECT_EQ(report.code, 0) << report;
+  EXPECT_FALSE(report.told("is not there")) << report;
+  EXPECT_EQ(run("export both -o path.txt --what trajectory").code, 0);
+  EXPECT_EQ(run("info both").code, 0);
+  EXPECT_EQ(run("evaluate trajectory both both/robots/" + name).code, 0);
 }
 
 TEST_F(Fuse, RobotsSideBySideMeetWhileTheyMap) {

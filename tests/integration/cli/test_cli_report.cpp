@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A result as one page: plumbline report.
+#include <fcntl.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <nlohmann/json.hpp>
@@ -289,6 +291,16 @@ TEST_F(Report, RefusesWhatIsNoResult) {
     EXPECT_EQ(killed.code, 3) << killed;
     EXPECT_TRUE(killed.told("interrupted") && killed.told("--resume")) << killed;
   }
+
+  // While its run goes on, it has the marker locked.
+  const int marker = open(path("killed.partial/.plumbline-unfinished").c_str(), O_RDONLY);
+  ASSERT_EQ(flock(marker, LOCK_EX), 0);
+  for (const char* folder : {"killed", "killed.partial"}) {
+    const Outcome running = run(std::string("report ") + folder);
+    EXPECT_EQ(running.code, 3) << running;
+    EXPECT_TRUE(running.told("the run is still going on; report when it has ended")) << running;
+  }
+  close(marker);
 }
 
 TEST_F(Report, OnlyReportsAreReplaced) {

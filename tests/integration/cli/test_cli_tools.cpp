@@ -59,6 +59,36 @@ TEST_F(Tools, InfoOfRecordingMapAndCloud) {
   EXPECT_EQ(run("info nothing").code, 3);
 }
 
+TEST_F(Tools, InfoOfAResultIsAPage) {
+  map_wall();
+  nlohmann::json summary = read_json(path("out/summary.json"));
+  for (int i = 0; i < 500; ++i)
+    summary["loops"]["list"].push_back({{"from", i}, {"to", i + 1}, {"off_m", 0.25}});
+  std::string reason = "because";
+  for (int i = 0; i < 60; ++i) reason += " of this";
+  summary["reason"] = reason;
+  write("out/summary.json", summary.dump());
+
+  const Outcome page = run("info out");
+  ASSERT_EQ(page.code, 0) << page;
+  EXPECT_NE(page.out.find("loops.list: 500 entries: from, off_m, to\n"), std::string::npos) << page;
+  EXPECT_NE(page.out.find("\nreason: because of this"), std::string::npos) << page;
+  std::istringstream lines(page.out);
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 120U) << line;
+
+  const Outcome all = run("info out --json");
+  EXPECT_EQ(all.code, 0) << all;
+  EXPECT_EQ(nlohmann::json::parse(all.out), summary);
+  EXPECT_EQ(run("info out/map.ply --json").code, 2);
+
+  write("out/summary.json", "{\"frames\": " + std::string(100000, '[') + "}");
+  for (const char* command : {"info out", "info out --json", "report out"}) {
+    const Outcome deep = run(command);
+    EXPECT_EQ(deep.code, 3) << deep;
+    EXPECT_TRUE(deep.told("summary.json:1:75: lists and objects nested deeper than 64 levels")) << deep;
+  }
+}
+
 TEST_F(Tools, RenderNeedsNoDisplay) {
   map_wall();
   for (const char* input : {"out", "out/map.ply", "out/map.pcd"}) {
@@ -112,6 +142,10 @@ TEST_F(Tools, EvaluateTellsWhatIsThere) {
   EXPECT_LT(report["ate_m"]["rmse"], 1e-5);
   EXPECT_EQ(report["tracked_percent"], 100.0);
   EXPECT_EQ(run("evaluate trajectory out nothing.txt").code, 3);
+  write("later.txt", "900 0 0 0 0 0 0 1\n901 0 0 0 0 0 0 1\n902 0 0 0 0 0 0 1\n");
+  const Outcome later = run("evaluate trajectory out later.txt");
+  EXPECT_EQ(later.code, 3) << later;
+  EXPECT_TRUE(later.told("out/trajectory.txt against later.txt: ")) << later;
   EXPECT_EQ(run("evaluate trajectory out wall --align so3").code, 2);
   const Outcome plots = run("evaluate trajectory out wall --plot charts");
   EXPECT_EQ(plots.code, 0) << plots;
