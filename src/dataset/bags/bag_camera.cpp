@@ -58,38 +58,115 @@ tl::expected<sensor::Lens, std::string> lens_of(const CameraInfoMessage& info) {
   return lens;
 }
 
-/// `rectified`: the image has been undistorted, the camera is that of P.
-tl::expected<InfoCamera, std::string> camera_of(const CameraInfoMessage& info, bool rectified) {
-  InfoCamera camera;
-  camera.frame = frame_name(info.header.frame_id);
+/// The camera of a message: of the full picture, and of the images that it accompanies.
+struct InfoPinholes {
+  sensor::Pinhole full;
+  sensor::Pinhole image;
+  [[nodiscard]] bool differ() const { return full.width != image.width || full.height != image.height; }
+};
+
+/// Size and offset along one axis of the image that is made of the full picture.
+struct InfoAxis {
+  std::uint32_t full = 0;
+  std::uint32_t offset = 0;
+  std::uint32_t region = 0;   ///< 0: up to the edge
+  std::uint32_t binning = 1;  ///< 0 means 1
+};
+
+/// The axis with both zeros replaced by what they mean; none if the region does not fit in the full picture.
+std::optional<InfoAxis> complete_axis(InfoAxis axis) {
+  if (axis.offset >= axis.full) return std::nullopt;
+  if (axis.region == 0) axis.region = axis.full - axis.offset;
+  if (axis.binning == 0) axis.binning = 1;
+  if (axis.region > axis.full - axis.offset || axis.binning > axis.region) return std::nullopt;
+  return axis;
+}
+
+/// REP 104: the region of interest is cut out of the full picture, and its pixels are binned. A pixel's
+/// middle is at whole numbers here, so that binned pixel 0 of two has its middle at 0.5 of the unbinned ones.
+tl::expected<InfoPinholes, std::string> pinholes_of(const CameraInfoMessage& info, bool by_p) {
   const auto size_ok = [](std::uint32_t size) { return size > 0 && size <= 32768; };
   if (!size_ok(info.width) || !size_ok(info.height))
     return tl::unexpected(fmt::format("says {} x {} pixels", info.width, info.height));
-  const bool by_p = rectified && info.p[0] != 0.0;
+
+  const RegionMessage& roi = info.roi;
+  const auto x = complete_axis({info.width, roi.x_offset, roi.width, info.binning_x});
+  const auto y = complete_axis({info.height, roi.y_offset, roi.height, info.binning_y});
+  if (!x || !y) {
+    return tl::unexpected(
+        fmt::format("has a region of interest of {} x {} pixels at {}, {} with a binning of {} x {}, which "
+                    "does not fit in its {} x {} pixels",
+                    roi.width, roi.height, roi.x_offset, roi.y_offset, info.binning_x, info.binning_y,
+                    info.width, info.height));
+  }
+
   const double fx = by_p ? info.p[0] : info.k[0];
   const double fy = by_p ? info.p[5] : info.k[4];
   const double cx = by_p ? info.p[2] : info.k[2];
   const double cy = by_p ? info.p[6] : info.k[5];
-  camera.pinhole = {static_cast<int>(info.width), static_cast<int>(info.height), fx, fy, cx, cy};
-  if (rectified) return camera;
-  auto lens = lens_of(info);
-  if (!lens) return tl::unexpected(lens.error());
-  camera.lens = *lens;
-  return camera;
+  const auto pixels = [](std::uint32_t size) { return static_cast<int>(size); };
+  const auto middle = [](double c, const InfoAxis& axis) {
+    return axis.binning == 1 ? c - axis.offset : (c - axis.offset + 0.5) / axis.binning - 0.5;
+  };
+  return InfoPinholes{{pixels(info.width), pixels(info.height), fx, fy, cx, cy},
+                      {pixels(x->region / x->binning), pixels(y->region / y->binning), fx / x->binning,
+                       fy / y->binning, middle(cx, *x), middle(cy, *y)}};
 }
 
+/// Size of a topic's first image; none if that cannot be read.
+std::optional<cv::Size> image_size(const BagSurvey& survey, const SurveyedTopic& topic) {
+  if (topic.images.empty()) return std::nullopt;
+  const MessagePlace& place = topic.images.front().place;
+  MessageImage image = tl::unexpected<std::string>("");
+  if (topic.is("sensor_msgs/Image")) {
+    if (const auto raw = survey.read(topic, place, &MessageDecoder::image)) image = image_of(*raw);
+  } else if (const auto file = survey.read(topic, place, &MessageDecoder::compressed_image)) {
+    image = image_of(*file);
+  }
+  return image ? std::optional(image->size()) : std::nullopt;
+}
+
+/// The camera of CameraInfo for the images of a topic; none, with a warning, where it was never calibrated.
 core::Result<std::optional<InfoCamera>> read_info(const BagSurvey& survey, const ChosenTopic& info,
-                                                  const std::string& image) {
+                                                  const SurveyedTopic& images, core::Log& log) {
   if (info.topic == nullptr) return std::nullopt;
   const auto message = survey.first(*info.topic, &MessageDecoder::camera_info);
   if (!message) return tl::unexpected(message.error());
-  if (message->k[0] == 0.0 && message->p[0] == 0.0)
-    return std::nullopt;  // a camera that was never calibrated
-  const bool rectified = image.find("image_rect") != std::string::npos;
-  const auto camera = camera_of(*message, rectified);
-  if (camera) return *camera;
-  return core::input_error(fmt::format("{}: {} {}; name a camera file with --camera", survey.path,
-                                       info.topic->topic.name, camera.error()));
+
+  // An image that has been undistorted has the camera of P.
+  const bool rectified = images.topic.name.find("image_rect") != std::string::npos;
+  const bool by_p = rectified && message->p[0] != 0.0;
+  const std::string place = fmt::format("{}: {}", survey.path, info.topic->topic.name);
+  if ((by_p ? message->p[0] : message->k[0]) == 0.0) {
+    log.warning(
+        fmt::format("{}: is there, but its K is zero: the camera was never calibrated; name a camera "
+                    "file with --camera",
+                    place));
+    return std::nullopt;
+  }
+
+  const auto wrong = [&place](const std::string& what) {
+    return core::input_error(fmt::format("{} {}; name a camera file with --camera", place, what));
+  };
+  const auto pinholes = pinholes_of(*message, by_p);
+  if (!pinholes) return wrong(pinholes.error());
+  InfoCamera camera{pinholes->image, {}, frame_name(message->header.frame_id)};
+  if (pinholes->differ()) {
+    const cv::Size full(pinholes->full.width, pinholes->full.height);
+    if (image_size(survey, images) == full) {
+      camera.pinhole = pinholes->full;
+      log.warning(
+          fmt::format("{}: says that only a part of the picture is sent, or that it is binned, but the "
+                      "images have the full size of {} x {}; they are taken for the full picture",
+                      place, full.width, full.height));
+    }
+  }
+  if (rectified) return camera;
+
+  const auto lens = lens_of(*message);
+  if (!lens) return wrong(lens.error());
+  camera.lens = *lens;
+  return camera;
 }
 
 /// Frames and how they sit in their parents.
@@ -223,12 +300,11 @@ core::Result<void> add_depth_camera(const BagSurvey& survey, const ChosenTopics&
 
 core::Result<std::optional<sensor::CameraReading>> bag_camera(const BagSurvey& survey,
                                                               const ChosenTopics& topics, core::Log& log) {
-  const auto color = read_info(survey, topics.info, topics.color.topic->topic.name);
-  if (!color) return tl::unexpected(color.error());
-  if (!*color) {
+  if (topics.info.topic == nullptr)
     log.warning(fmt::format("{}: has no CameraInfo for {}", survey.path, topics.color.topic->topic.name));
-    return std::nullopt;
-  }
+  const auto color = read_info(survey, topics.info, *topics.color.topic, log);
+  if (!color) return tl::unexpected(color.error());
+  if (!*color) return std::nullopt;
 
   sensor::CameraReading reading;
   reading.program = "ROS";
@@ -241,7 +317,7 @@ core::Result<std::optional<sensor::CameraReading>> bag_camera(const BagSurvey& s
   const std::string stream = realsense_stream(topics.depth.topic->topic.name);
   if (!stream.empty()) reading.camera.depth_scale = realsense_depth_scale(survey, stream);
 
-  const auto depth = read_info(survey, topics.depth_info, topics.depth.topic->topic.name);
+  const auto depth = read_info(survey, topics.depth_info, *topics.depth.topic, log);
   if (!depth) return tl::unexpected(depth.error());
   if (*depth) {
     if (auto added = add_depth_camera(survey, topics, **color, **depth, reading); !added)

@@ -10,10 +10,11 @@
 
 namespace plumbline::dataset {
 
-/// None when there is no CameraInfo of colour. Where depth has a camera of its own, color_from_depth comes
-/// from /tf_static, /tf, or RealSense's own transforms. Errors (kUsage): colour and depth are of different
-/// cameras and nothing says how they sit: both are named, and the option; (kInput): numbers that make no
-/// camera.
+/// None when there is no CameraInfo of colour, or one of a camera that was never calibrated; a warning says
+/// which. Regions of interest and binning are applied (REP 104). Where depth has a camera of its own,
+/// color_from_depth comes from /tf_static, /tf, or RealSense's own transforms. Errors (kUsage): colour and
+/// depth are of different cameras and nothing says how they sit: both are named, and the option; (kInput):
+/// numbers that make no camera.
 core::Result<std::optional<sensor::CameraReading>> bag_camera(const BagSurvey& survey,
                                                               const ChosenTopics& topics, core::Log& log);
 

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <limits>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "bags/rvl.hpp"
 #include "images/image_decoders.hpp"
@@ -69,15 +70,24 @@ void swap_bytes(cv::Mat& image) {
   }
 }
 
-/// 12 bytes in front of compressed depth, and of floats what their inverses were made to integers by.
-struct DepthHead {
-  static constexpr std::size_t kBytes = 12;
+/// Bytes in front of compressed depth: 12, of which the last 8 say how inverse floats became integers.
+constexpr std::size_t kDepthHead = 12;
+
+struct InverseDepth {
   float a = 0.0F;
   float b = 0.0F;
 };
 
+/// The two numbers in front of `begin`; none where there are fewer bytes.
+std::optional<InverseDepth> inverse_depth(const Bytes& data, std::size_t begin) {
+  std::array<float, 2> numbers{};
+  if (begin < sizeof(numbers)) return std::nullopt;
+  std::memcpy(numbers.data(), data.data() + begin - sizeof(numbers), sizeof(numbers));
+  return InverseDepth{numbers[0], numbers[1]};
+}
+
 /// z = a / (value - b); 0 means no measurement.
-cv::Mat metres_of(const cv::Mat& values, const DepthHead& head) {
+cv::Mat metres_of(const cv::Mat& values, const InverseDepth& head) {
   cv::Mat metres(values.size(), CV_32FC1);
   for (int v = 0; v < values.rows; ++v) {
     const auto* from = values.ptr<std::uint16_t>(v);
@@ -113,18 +123,33 @@ MessageImage decode_file(const Bytes& file) {
   return std::move(*image);
 }
 
+/// Byte at which the PNG of compressed depth begins, behind a head that not all programs write with 12 bytes.
+std::size_t begin_of_png(const Bytes& data) {
+  constexpr std::array<std::uint8_t, 8> kSignature = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
+  constexpr std::size_t kLongestHead = 64;
+  const auto end =
+      data.begin() + static_cast<std::ptrdiff_t>(std::min(data.size(), kLongestHead + kSignature.size()));
+  const auto found = std::search(data.begin(), end, kSignature.begin(), kSignature.end());
+  return found == end ? kDepthHead : static_cast<std::size_t>(found - data.begin());
+}
+
 MessageImage compressed_depth(const CompressedImageMessage& message) {
-  if (message.data.size() <= DepthHead::kBytes) return tl::unexpected<std::string>("holds no image");
-  DepthHead head;
-  std::memcpy(&head.a, message.data.data() + 4, sizeof(float));
-  std::memcpy(&head.b, message.data.data() + 8, sizeof(float));
-  const std::uint8_t* data = message.data.data() + DepthHead::kBytes;
-  const std::size_t size = message.data.size() - DepthHead::kBytes;
   const bool rvl = message.format.find("rvl") != std::string::npos;
+  const std::size_t begin = rvl ? kDepthHead : begin_of_png(message.data);
+  if (message.data.size() <= begin) return tl::unexpected<std::string>("holds no image");
+
+  const std::uint8_t* data = message.data.data() + begin;
+  const std::size_t size = message.data.size() - begin;
   MessageImage image = rvl ? rvl_image(data, size) : decode_file(Bytes(data, data + size));
   if (!image || message.format.rfind("32FC1", 0) != 0) return image;
+
+  const auto inverse = inverse_depth(message.data, begin);
+  if (!inverse) {
+    return tl::unexpected<std::string>(
+        "has no numbers in front of its PNG that turn it into metres; record the topic as 16UC1");
+  }
   if (image->type() != CV_16UC1) return tl::unexpected<std::string>("holds no 16-bit image");
-  return metres_of(*image, head);
+  return metres_of(*image, *inverse);
 }
 
 }  // namespace

@@ -37,15 +37,28 @@ struct CompressedImageMessage {
   Bytes data;
 };
 
-/// sensor_msgs/CameraInfo
+/// sensor_msgs/RegionOfInterest, in pixels of the camera's full picture; all 0: the full picture
+struct RegionMessage {
+  std::uint32_t x_offset = 0;
+  std::uint32_t y_offset = 0;
+  std::uint32_t height = 0;
+  std::uint32_t width = 0;
+  bool do_rectify = false;
+};
+
+/// sensor_msgs/CameraInfo: size, k and p are of the camera's full picture. An image of the topic beside it is
+/// the region of interest, of which binning_x times binning_y pixels became one.
 struct CameraInfoMessage {
   MessageHeader header;
   std::uint32_t height = 0;
   std::uint32_t width = 0;
   std::string distortion_model;
   std::vector<double> d;
-  std::array<double, 9> k{};   ///< row by row
-  std::array<double, 12> p{};  ///< projection matrix of the rectified image, row by row
+  std::array<double, 9> k{};    ///< row by row
+  std::array<double, 12> p{};   ///< projection matrix of the rectified image, row by row
+  std::uint32_t binning_x = 0;  ///< 0 means 1
+  std::uint32_t binning_y = 0;
+  RegionMessage roi;
 };
 
 /// geometry_msgs/TransformStamped of a tf2_msgs/TFMessage

@@ -3,6 +3,7 @@
 // Files of other programs: tests/integration/bags.
 #include <gmock/gmock.h>
 
+#include <array>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -362,6 +363,41 @@ TEST(MessageImages, UnknownEncodingsAreNamed) {
   EXPECT_THAT(image_of(message).error(), AllOf(HasSubstr("nv24"), HasSubstr("rgb8")));
   message.encoding = "bayer_rggb8";
   EXPECT_THAT(image_of(message).error(), HasSubstr("image_proc"));
+}
+
+/// compressedDepth of 2 x 1 pixels, 1000 and 2000, behind a head of `head` bytes that ends in a and b.
+CompressedImageMessage compressed_depth(const std::string& format, std::size_t head) {
+  cv::Mat values(1, 2, CV_16UC1);
+  values.at<std::uint16_t>(0, 0) = 1000;
+  values.at<std::uint16_t>(0, 1) = 2000;
+  std::vector<std::uint8_t> png;
+  cv::imencode(".png", values, png);
+
+  CompressedImageMessage message;
+  message.format = format;
+  message.data.assign(head, 0x89);  // PNG's first byte, alone
+  const std::array<float, 2> inverse = {3000.0F, 500.0F};
+  if (head >= sizeof(inverse))
+    std::memcpy(message.data.data() + head - sizeof(inverse), &inverse, sizeof(inverse));
+  message.data.insert(message.data.end(), png.begin(), png.end());
+  return message;
+}
+
+TEST(MessageImages, CompressedDepthBehindAnyHead) {
+  for (const std::size_t head : {0U, 4U, 12U, 16U, 24U}) {
+    const auto image = image_of(compressed_depth("16UC1; compressedDepth png", head));
+    ASSERT_TRUE(image) << head << ": " << image.error();
+    ASSERT_EQ(image->size(), cv::Size(2, 1));
+    EXPECT_EQ(image->at<std::uint16_t>(0, 1), 2000) << head;
+  }
+  for (const std::size_t head : {12U, 16U}) {
+    const auto metres = image_of(compressed_depth("32FC1; compressedDepth png", head));
+    ASSERT_TRUE(metres) << head << ": " << metres.error();
+    EXPECT_NEAR(metres->at<float>(0, 0), 6.0F, 1e-6) << head;
+    EXPECT_NEAR(metres->at<float>(0, 1), 2.0F, 1e-6) << head;
+  }
+  EXPECT_THAT(image_of(compressed_depth("32FC1; compressedDepth png", 0)).error(), HasSubstr("16UC1"));
+  EXPECT_FALSE(image_of(CompressedImageMessage{{}, "16UC1; compressedDepth png", Bytes(5, 1)}));
 }
 
 TEST(Rvl, TakesNoMoreThanThereIs) {

@@ -148,6 +148,11 @@ DecodedMessage<CameraInfoMessage> read_camera_info(const Bytes& bytes) {
   message.d.assign(sample->d._buffer, sample->d._buffer + sample->d._length);
   std::copy(std::begin(sample->k), std::end(sample->k), message.k.begin());
   std::copy(std::begin(sample->p), std::end(sample->p), message.p.begin());
+
+  message.binning_x = sample->binning_x;
+  message.binning_y = sample->binning_y;
+  const auto& roi = sample->roi;
+  message.roi = {roi.x_offset, roi.y_offset, roi.height, roi.width, roi.do_rectify};
   return message;
 }
 
@@ -257,6 +262,11 @@ Bytes encode_cdr(const CameraInfoMessage& message) {
   std::copy(message.k.begin(), message.k.end(), std::begin(sample.k));
   std::copy(message.p.begin(), message.p.end(), std::begin(sample.p));
   sample.r[0] = sample.r[4] = sample.r[8] = 1.0;
+
+  sample.binning_x = message.binning_x;
+  sample.binning_y = message.binning_y;
+  const RegionMessage& roi = message.roi;
+  sample.roi = {roi.x_offset, roi.y_offset, roi.height, roi.width, roi.do_rectify};
   return write_sample(&sample, sensor_msgs_msg_dds__CameraInfo__desc);
 }
 

@@ -125,6 +125,14 @@ DecodedMessage<CameraInfoMessage> ros1_camera_info(const Bytes& bytes) {
   std::array<double, 9> rectification{};
   fields.numbers(rectification);
   fields.numbers(message.p);
+
+  message.binning_x = fields.number<std::uint32_t>();
+  message.binning_y = fields.number<std::uint32_t>();
+  message.roi.x_offset = fields.number<std::uint32_t>();
+  message.roi.y_offset = fields.number<std::uint32_t>();
+  message.roi.height = fields.number<std::uint32_t>();
+  message.roi.width = fields.number<std::uint32_t>();
+  message.roi.do_rectify = fields.number<std::uint8_t>() != 0;
   return whole(fields, std::move(message));
 }
 
