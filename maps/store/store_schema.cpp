@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "plumbline/core/git_lfs.hpp"
 #include "store/store_codec.hpp"
 
 namespace plumbline::maps {
@@ -164,6 +165,7 @@ void check_file(const std::filesystem::path& file) {
   if (!std::filesystem::is_regular_file(file, ignored)) {
     throw StoreFailure(core::ErrorKind::kInput, "is not a file; give the map.db of a result folder");
   }
+  if (core::is_lfs_pointer(file)) throw StoreFailure(core::ErrorKind::kInput, core::kLfsPointer);
   constexpr std::uintmax_t kHeaderBytes = 100;  // of any SQLite file; a shorter one opens as an empty one
   const std::uintmax_t bytes = std::filesystem::file_size(file, ignored);
   if (bytes > 0 && bytes < kHeaderBytes) throw BadBytes("it ends before its header does");

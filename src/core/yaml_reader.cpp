@@ -12,6 +12,7 @@
 #include <system_error>
 
 #include "plumbline/core/config.hpp"
+#include "plumbline/core/git_lfs.hpp"
 
 namespace plumbline::core {
 namespace {
@@ -296,6 +297,7 @@ std::optional<ConfigNode> read_yaml(const std::filesystem::path& file, ConfigPro
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (stream.bad()) return unreadable(file, "cannot be read", problems);
   text.resize(static_cast<std::size_t>(stream.gcount()));
+  if (begins_as_lfs_pointer(text)) return unreadable(file, kLfsPointer, problems);
   return parse_yaml(text, file.string(), problems);
 }
 

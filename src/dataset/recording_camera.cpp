@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "frame_images.hpp"
+#include "plumbline/core/git_lfs.hpp"
 #include "plumbline/dataset/summary.hpp"
 
 namespace plumbline::dataset {
@@ -63,7 +64,8 @@ core::Result<std::optional<fs::path>> find_camera_file(const fs::path& folder, c
   for (std::size_t i = 0; i < kCameraFiles.size(); ++i) {
     const fs::path file = folder / kCameraFiles[i];
     if (!fs::exists(file, ignored)) continue;
-    if (i < kMustBeCameras || sensor::is_foreign_camera_file(file, true)) return file;
+    const bool must = i < kMustBeCameras || core::is_lfs_pointer(file);
+    if (must || sensor::is_foreign_camera_file(file, true)) return file;
     log.warning(fmt::format("{}: is not a known camera file; it is not used", file.string()));
   }
 
@@ -202,9 +204,9 @@ core::Result<cv::Size> size_in(const Layout& layout, bool depth) {
       image_size(layout, [depth](const PairInfo& pair) { return depth ? pair.depth_file : pair.color_file; });
   if (size) return *size;
   const PairInfo& first = layout.pairs.front();
-  return core::input_error(fmt::format("{}: no {} image can be read to tell its size; this is the first",
-                                       depth ? first.depth_file : first.color_file,
-                                       depth ? "depth" : "colour"));
+  const auto image = read_stored(layout, depth ? first.depth_file : first.color_file);
+  return core::input_error(fmt::format("{}; no {} image can be read to tell its size, and this is the first",
+                                       image ? "" : image.error().message, depth ? "depth" : "colour"));
 }
 
 /// Sizes that the camera file does not say, from the images.
@@ -265,18 +267,21 @@ void scale_to_images(const Layout& layout, sensor::Camera& camera) {
 }
 
 core::Result<sensor::Camera> guess(const fs::path& folder, const Layout& layout, core::Log& log) {
+  if (const auto size = size_in(layout, false); !size) return tl::unexpected(size.error());
   const auto camera = guessed_camera(layout);
+  const bool has_place = is_folder(folder);  // for a camera.yaml; bags and live cameras have none
   if (!camera) {
     return core::usage_error(fmt::format(
-        "{}: no camera.yaml in the folder; put one there or name a calibration with --camera "
+        "{}: no {}name a calibration with --camera "
         "(shipped: tum_fr1, tum_fr2, tum_fr3, icl_nuim, seven_scenes; or a file, also of another program)",
-        folder.string()));
+        folder.string(),
+        has_place ? "camera.yaml in the folder; put one there or " : "calibration of its camera; "));
   }
 
   std::string text = fmt::format(
-      "{}: no camera.yaml; its images have the size of a {}, so fx = fy = {:g} is guessed; put a camera.yaml "
-      "there or name one with --camera",
-      folder.string(), camera->name, camera->color.fx);
+      "{}: no {}; its images have the size of a {}, so fx = fy = {:g} is guessed; {}name one with --camera",
+      folder.string(), has_place ? "camera.yaml" : "calibration of its camera", camera->name,
+      camera->color.fx, has_place ? "put a camera.yaml there or " : "");
   if (layout.format == "7scenes") {
     text +=
         "; 7-Scenes as it is published has depth that is not registered to colour: --camera seven_scenes "

@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <fstream>
 
+#include "plumbline/core/git_lfs.hpp"
 #include "plumbline/core/shortage.hpp"
 
 namespace plumbline::dataset {
@@ -34,6 +35,8 @@ core::Result<std::vector<RawLine>> read_raw_lines(const std::filesystem::path& f
   std::string text;
   for (int number = 1; lines.size() < most && std::getline(stream, text); ++number) {
     if (number == 1 && text.compare(0, 3, "\xEF\xBB\xBF") == 0) text.erase(0, 3);
+    if (number == 1 && core::begins_as_lfs_pointer(text))
+      return core::input_error(fmt::format("{}: {}", file.string(), core::kLfsPointer));
     lines.push_back({number, text});
   }
   return lines;

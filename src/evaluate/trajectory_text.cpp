@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "plumbline/core/git_lfs.hpp"
 #include "plumbline/core/json.hpp"
 #include "plumbline/core/numbers.hpp"
 #include "plumbline/evaluate/trajectory.hpp"
@@ -116,6 +117,8 @@ Json json_of(const TrajectoryReport& r) {
 core::Result<std::vector<double>> read_frame_stamps(const std::filesystem::path& list) {
   std::ifstream in(list);
   if (!in) return core::input_error(fmt::format("{}: cannot be read", list.string()));
+  if (core::is_lfs_pointer(list))
+    return core::input_error(fmt::format("{}: {}", list.string(), core::kLfsPointer));
   std::vector<double> stamps;
   std::string line;
 

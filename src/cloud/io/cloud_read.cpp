@@ -7,6 +7,7 @@
 
 #include "io/cloud_table.hpp"
 #include "plumbline/cloud/io/ply.hpp"
+#include "plumbline/core/git_lfs.hpp"
 #include "plumbline/core/text.hpp"
 
 namespace plumbline::cloud {
@@ -80,6 +81,7 @@ core::Result<CloudFile> read_cloud(const std::filesystem::path& file, LargeCoord
   if (std::filesystem::is_directory(file, error)) {
     return core::input_error(file.string() + ": is a folder, a cloud file is needed");
   }
+  if (core::is_lfs_pointer(file)) return core::input_error(file.string() + ": " + core::kLfsPointer);
   const std::string ending = core::ending_of(file);
   if (ending == ".ply") return read_ply_cloud(file, large);
   if (ending == ".pcd") return read_pcd_cloud(file, large);

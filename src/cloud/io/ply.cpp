@@ -9,6 +9,7 @@
 
 #include "io/ply_header.hpp"
 #include "io/shift.hpp"
+#include "plumbline/core/git_lfs.hpp"
 #include "plumbline/core/output_file.hpp"
 
 namespace plumbline::cloud {
@@ -309,6 +310,7 @@ void PlyData::add(std::string name, std::vector<std::uint8_t> values) {
 core::Result<PlyData> read_ply(const std::filesystem::path& file, bool take_shift) {
   ByteReader reader(file);
   if (!reader.open()) return core::input_error(file.string() + ": cannot be read");
+  if (core::is_lfs_pointer(file)) return core::input_error(file.string() + ": " + core::kLfsPointer);
   auto header = read_ply_header(reader);
   if (!header) return core::input_error(file.string() + ": " + header.error().message);
   PlyData data;

@@ -11,6 +11,8 @@
 
 #include "bags/bag_parts.hpp"
 #include "layout.hpp"
+#include "plumbline/core/git_lfs.hpp"
+#include "plumbline/core/text.hpp"
 
 namespace plumbline::dataset {
 namespace {
@@ -64,6 +66,20 @@ std::vector<fs::path> files_of(const fs::path& path) {
     return natural_key(a.filename().string()) < natural_key(b.filename().string());
   });
   return files;
+}
+
+/// Notes the files of a bag that Git LFS has not fetched; the others are read.
+void note_missing_files(const fs::path& path, std::vector<std::string>& notes) {
+  std::error_code ignored;
+  std::vector<std::string> missing;
+  for (const auto& entry : fs::directory_iterator(path, ignored)) {
+    const std::string ending = core::ending_of(entry.path());
+    const bool bag = ending == ".mcap" || ending == ".db3" || ending == ".zstd";
+    if (bag && core::is_lfs_pointer(entry.path()))
+      missing.push_back(fmt::format("{}: {}", entry.path().string(), core::kLfsPointer));
+  }
+  std::sort(missing.begin(), missing.end());
+  notes.insert(notes.end(), missing.begin(), missing.end());
 }
 
 /// Null for encodings that are not read.
@@ -176,6 +192,7 @@ core::Result<BagSurvey> survey_bag(const fs::path& path) {
   }
 
   if (survey.files.empty()) return tl::unexpected(first_problem);
+  note_missing_files(path, survey.notes);
   if (surveyor.without_stamp() > 0) {
     survey.notes.push_back(fmt::format("{}: {} images have a damaged head and are left out", survey.path,
                                        surveyor.without_stamp()));

@@ -5,6 +5,8 @@
 
 #include <charconv>
 
+#include "plumbline/core/git_lfs.hpp"
+
 namespace plumbline::dataset {
 namespace {
 
@@ -39,8 +41,10 @@ core::Result<void> VideoFrames::open() {
   if (!decoder) return tl::unexpected(decoder.error());
   decoder_ = *decoder;
   video_ = decoder_->open(file_.c_str());
-  if (video_ == nullptr) return core::input_error(file_ + ": is not a video that can be decoded");
-  return {};
+  if (video_ != nullptr) return {};
+  const bool pointer = core::is_lfs_pointer(file_);
+  return core::input_error(file_ + ": " +
+                           (pointer ? core::kLfsPointer : "is not a video that can be decoded"));
 }
 
 bool VideoFrames::go_to(std::int64_t frame) {

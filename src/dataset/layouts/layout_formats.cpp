@@ -8,6 +8,7 @@
 #include <map>
 
 #include "layout.hpp"
+#include "plumbline/core/git_lfs.hpp"
 #include "plumbline/dataset/recording_poses.hpp"
 #include "text_lines.hpp"
 
@@ -59,6 +60,17 @@ std::string what_is_there(const fs::path& folder) {
   std::string text;
   for (const std::string& word : seen) text += (text.empty() ? "" : ", ") + word;
   return text;
+}
+
+/// The first file of the folder, by name, that is a Git LFS pointer; "": none is.
+fs::path lfs_pointer_in(const fs::path& folder) {
+  fs::path first;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    const fs::path& path = entry.path();
+    if ((first.empty() || path < first) && core::is_lfs_pointer(path)) first = path;
+  }
+  return first;
 }
 
 /// The layout of which the largest share of parts exists, and what it lacks; "" if no layout has any part.
@@ -137,6 +149,7 @@ bool is_part_of_recording(const fs::path& file) {
 }
 
 std::string not_a_recording_file(const fs::path& file) {
+  if (core::is_lfs_pointer(file)) return fmt::format("{}: {}", file.string(), core::kLfsPointer);
   std::array<char, 4> magic{};
   std::ifstream(file, std::ios::binary).read(magic.data(), magic.size());
   const bool zip = magic == std::array<char, 4>{'P', 'K', '\x03', '\x04'};
@@ -159,6 +172,9 @@ std::string not_a_recording(const fs::path& folder) {
     looked_for +=
         fmt::format("{}{} ({})", looked_for.empty() ? "" : ", ", format->looked_for, format->program);
   }
+  if (const fs::path pointer = lfs_pointer_in(folder); !pointer.empty())
+    return fmt::format("{}: {}", pointer.string(), core::kLfsPointer);
+
   const std::string seen = what_is_there(folder);
   std::string text = fmt::format("{}: {}; looked for {}", folder.string(),
                                  seen.empty() ? "the folder is empty" : "no recording found", looked_for);

@@ -11,6 +11,7 @@
 #include <fstream>
 
 #include "camera_files/camera_formats.hpp"
+#include "plumbline/core/git_lfs.hpp"
 
 namespace plumbline::sensor {
 namespace {
@@ -28,6 +29,7 @@ core::Result<std::string> read_camera_text(const std::filesystem::path& file) {
   text.resize(static_cast<std::size_t>(stream.gcount()));
   if (text.size() > kMaxCameraBytes)
     return core::usage_error(file.string() + ": is over 1 MB and thus not a camera file");
+  if (core::begins_as_lfs_pointer(text)) return core::usage_error(file.string() + ": " + core::kLfsPointer);
   return text;
 }
 
