@@ -25,6 +25,7 @@ class FolderSource final : public FrameSource {
   [[nodiscard]] const std::string& format() const override { return layout_.format; }
   [[nodiscard]] const sensor::Camera& camera() const override { return camera_; }
   [[nodiscard]] std::size_t size() const override { return layout_.pairs.size(); }
+  [[nodiscard]] std::size_t missing() const override { return layout_.missing; }
   [[nodiscard]] PairInfo info(std::size_t index) const override { return layout_.pairs.at(index); }
   [[nodiscard]] std::optional<geometry::Trajectory> truth() const override { return layout_.truth; }
   [[nodiscard]] bool truth_is_odometry() const override { return layout_.truth_is_odometry; }
@@ -69,10 +70,18 @@ class FolderSource final : public FrameSource {
       return core::usage_error(
           name_ + ": each image has its own camera, which a copy cannot describe; map the original");
     }
+
     auto color = stored_image(pair.color_file);
     if (!color) return tl::unexpected(color.error());
+    if (auto good = check_color(pair.color_file, color->pixels, camera_.color, layout_.color_reduction);
+        !good)
+      return tl::unexpected(good.error());
+
     auto depth = layout_.confidence.empty() ? stored_image(pair.depth_file) : masked_depth(pair);
     if (!depth) return tl::unexpected(depth.error());
+    const sensor::Pinhole& depth_camera = camera_.depth ? *camera_.depth : camera_.color;
+    if (auto good = check_depth(pair.depth_file, depth->pixels, depth_camera); !good)
+      return tl::unexpected(good.error());
     return StoredPair{std::move(*color), std::move(*depth)};
   }
 
@@ -96,12 +105,34 @@ class FolderSource final : public FrameSource {
 
   [[nodiscard]] core::Result<StoredImage> stored_image(const std::string& name) const {
     if (layout_.images) return layout_.images->stored(name);
-    if (!is_file(name)) {  // in a film, or packed with all others
+    core::Result<StoredImage> image;
+    if (is_file(name)) {
+      image = stored_file(name);
+    } else {  // in a film, or packed with all others
       auto pixels = read_stored(layout_, name, video_.get());
       if (!pixels) return tl::unexpected(pixels.error());
-      return StoredImage{"", {}, std::move(*pixels)};
+      image->pixels = std::move(*pixels);
     }
-    return stored_file(name);
+    if (image) image->linked_out = linked_out(name);
+    return image;
+  }
+
+  /// True if a link in the recording's folder leads out of it to an image's file, or to its film. The folder
+  /// itself may be a link, and a list may name files elsewhere.
+  [[nodiscard]] bool linked_out(const std::string& name) const {
+    const auto inside = [](const std::filesystem::path& file, const std::filesystem::path& folder) {
+      const std::filesystem::path relative = file.lexically_relative(folder);
+      return !relative.empty() && *relative.begin() != "..";
+    };
+    const auto film = is_file(name) ? std::nullopt : video_frame_of(name);
+    const std::filesystem::path file = film ? film->first : name;
+
+    std::error_code problem;
+    const auto named = std::filesystem::absolute(file, problem).lexically_normal();
+    const auto folder = std::filesystem::absolute(layout_.folder, problem).lexically_normal();
+    if (problem || !inside(named, folder)) return false;
+    const auto real = std::filesystem::canonical(file, problem);
+    return !problem && !inside(real, std::filesystem::canonical(layout_.folder, problem)) && !problem;
   }
 
   /// A copy has no masks, so masked depth is removed from the images.
@@ -112,7 +143,7 @@ class FolderSource final : public FrameSource {
     const auto mask =
         std::filesystem::path(layout_.confidence) / std::filesystem::path(pair.depth_file).filename();
     if (auto masked = mask_depth(mask.string(), *depth); !masked) return tl::unexpected(masked.error());
-    return StoredImage{"", {}, std::move(*depth)};
+    return StoredImage{"", {}, std::move(*depth), linked_out(pair.depth_file)};
   }
 
   std::string name_;

@@ -105,10 +105,11 @@ core::Result<void> mask_depth(const std::string& mask_file, cv::Mat& depth) {
   return {};
 }
 
-core::Result<cv::Mat> color_pixels(const std::string& name, cv::Mat image, const sensor::Pinhole& camera,
-                                   int reduction) {
-  const bool deep = image.depth() == CV_16U && image.channels() >= 3;
-  if (image.depth() != CV_8U && !deep) {
+core::Result<void> check_color(const std::string& name, const cv::Mat& image, const sensor::Pinhole& camera,
+                               int reduction) {
+  const int channels = image.channels();
+  const bool colors = channels == 3 || channels == 4;
+  if (!(image.depth() == CV_8U && (colors || channels == 1)) && !(image.depth() == CV_16U && colors)) {
     return core::input_error(
         fmt::format("{}: the colour image has {}; 8 bits are needed", name, type_name(image)));
   }
@@ -116,10 +117,26 @@ core::Result<cv::Mat> color_pixels(const std::string& name, cv::Mat image, const
   sensor::Pinhole stored = camera;
   stored.width *= reduction;
   stored.height *= reduction;
-  if (auto size = check_size(name, image, stored, "colour"); !size) return tl::unexpected(size.error());
+  return check_size(name, image, stored, "colour");
+}
+
+core::Result<void> check_depth(const std::string& name, const cv::Mat& image, const sensor::Pinhole& camera) {
+  const bool one = image.type() == CV_16UC1 || image.type() == CV_32FC1 || image.type() == CV_64FC1;
+  if (!one && !(image.type() == CV_16UC3 && channels_are_equal(image))) {
+    return core::input_error(
+        fmt::format("{}: the depth image has {}; a 16-bit PNG or PGM with one channel is needed, or floats "
+                    "of 32 bits in metres (TIFF or EXR)",
+                    name, type_name(image)));
+  }
+  return check_size(name, image, camera, "depth");
+}
+
+core::Result<cv::Mat> color_pixels(const std::string& name, cv::Mat image, const sensor::Pinhole& camera,
+                                   int reduction) {
+  if (auto good = check_color(name, image, camera, reduction); !good) return tl::unexpected(good.error());
 
   if (reduction > 1) cv::resize(image, image, {camera.width, camera.height}, 0.0, 0.0, cv::INTER_AREA);
-  if (deep) image.convertTo(image, CV_8U, 1.0 / 257.0);  // 65535 becomes 255
+  if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / 257.0);  // 65535 becomes 255
   if (image.channels() == 1) cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);
   if (image.channels() == 4) cv::cvtColor(image, image, cv::COLOR_BGRA2BGR);
   return image;
@@ -127,15 +144,9 @@ core::Result<cv::Mat> color_pixels(const std::string& name, cv::Mat image, const
 
 core::Result<cv::Mat> depth_pixels(const std::string& name, cv::Mat image, const sensor::Pinhole& camera,
                                    double depth_scale) {
+  if (auto good = check_depth(name, image, camera); !good) return tl::unexpected(good.error());
   if (image.type() == CV_64FC1) image.convertTo(image, CV_32F);
-  if (image.type() == CV_16UC3 && channels_are_equal(image)) cv::extractChannel(image, image, 0);
-  if (image.type() != CV_16UC1 && image.type() != CV_32FC1) {
-    return core::input_error(
-        fmt::format("{}: the depth image has {}; a 16-bit PNG or PGM with one channel is needed, or floats "
-                    "of 32 bits in metres (TIFF or EXR)",
-                    name, type_name(image)));
-  }
-  if (auto size = check_size(name, image, camera, "depth"); !size) return tl::unexpected(size.error());
+  if (image.type() == CV_16UC3) cv::extractChannel(image, image, 0);
   return image.type() == CV_32FC1 ? depth_units(image, depth_scale) : image;
 }
 

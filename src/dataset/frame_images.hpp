@@ -26,8 +26,14 @@ inline constexpr double kFloatDepthScale = 5000.0;
 core::Result<cv::Mat> read_stored(const Layout& layout, const std::string& name,
                                   VideoFrames* video = nullptr);
 
-/// A file's bytes, undecoded. Error (kInput): cannot be read.
+/// A file's bytes and pixels. Error (kInput): cannot be read, or is no image.
 core::Result<StoredImage> stored_file(const std::string& file);
+
+/// Checks that pixels are those of an image that color_pixels and depth_pixels take. Error (kInput): names
+/// the image and what is wrong.
+core::Result<void> check_color(const std::string& name, const cv::Mat& image, const sensor::Pinhole& camera,
+                               int reduction = 1);
+core::Result<void> check_depth(const std::string& name, const cv::Mat& image, const sensor::Pinhole& camera);
 
 /// Converts pixels that were already read into those of read_color and read_depth; `name` is for messages.
 core::Result<cv::Mat> color_pixels(const std::string& name, cv::Mat image, const sensor::Pinhole& camera,

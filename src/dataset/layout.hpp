@@ -46,6 +46,8 @@ struct Layout {
   bool truth_is_odometry = false;              ///< the recorder's own poses, known while recording
   bool gives_odometry = false;                 ///< frames have them
   std::shared_ptr<const ImageStore> images{};  ///< where the images are; null: in files
+  std::filesystem::path folder{};              ///< the recording's, as it was given
+  std::size_t missing = 0;                     ///< frames of the part that is read whose files do not exist
 };
 
 struct LayoutOptions {
@@ -145,8 +147,7 @@ std::string no_common_time(const std::string& color_name, const std::vector<Stam
                            const std::string& depth_name, const std::vector<StampedFile>& depth,
                            double max_gap_s);
 
-/// All of a list's files missing is an error that names the first one; some missing is a warning.
-core::Result<void> check_files(const std::string& list, const std::vector<StampedFile>& files,
-                               core::Log& log);
+/// All of a list's files missing is an error that names the first one.
+core::Result<void> check_files(const std::string& list, const std::vector<StampedFile>& files);
 
 }  // namespace plumbline::dataset

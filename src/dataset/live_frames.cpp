@@ -372,13 +372,11 @@ core::Result<LiveFrame> stored_frame(const FrameSource& source, std::size_t inde
   LiveFrame frame;
   frame.stamp = info.stamp;
   frame.depth_stamp = info.depth_stamp - camera.depth_delay_s;
-  auto color = pixels_of(pair->color);
-  if (color) color = color_pixels(info.color_file, std::move(*color), camera.color);
+  auto color = color_pixels(info.color_file, std::move(pair->color.pixels), camera.color);
   if (!color) return tl::unexpected<core::Error>(color.error());
 
-  auto depth = pixels_of(pair->depth);
   const sensor::Pinhole& depth_camera = camera.depth ? *camera.depth : camera.color;
-  if (depth) depth = depth_pixels(info.depth_file, std::move(*depth), depth_camera, camera.depth_scale);
+  auto depth = depth_pixels(info.depth_file, std::move(pair->depth.pixels), depth_camera, camera.depth_scale);
   if (!depth) return tl::unexpected<core::Error>(depth.error());
   frame.color = std::move(*color);
   frame.depth = std::move(*depth);

@@ -10,10 +10,12 @@
 
 #include "bags/bag_recording.hpp"
 #include "depth_check.hpp"
+#include "films/video_frames.hpp"
 #include "frame_images.hpp"
 #include "layout.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/dataset/recording_poses.hpp"
+#include "plumbline/dataset/selection.hpp"
 #include "plumbline/dataset/summary.hpp"
 #include "recording_camera.hpp"
 
@@ -101,35 +103,68 @@ void drop_same_stamps(const std::string& folder, std::vector<PairInfo>& pairs, c
   pairs.erase(end, pairs.end());
 }
 
-core::Result<void> select(const OpenOptions& options, const std::string& folder,
-                          std::vector<PairInfo>& pairs) {
-  if (options.every < 1) {
-    return core::usage_error(fmt::format("every: {} is out of range (allowed: 1 or more)", options.every));
+/// The frames that a recording names, with those that are there.
+struct ListedFrames {
+  std::vector<double> stamps;
+  std::vector<std::optional<std::size_t>> places;  ///< among the layout's pairs; none: a file is missing
+};
+
+/// The first of a pair's files that does not exist; "": both do, or they are in a film or in a bag.
+std::string missing_file(const Layout& layout, const PairInfo& pair) {
+  if (layout.images || layout.packed) return "";
+  for (const std::string* name : {&pair.color_file, &pair.depth_file}) {
+    if (!layout.video.empty() && video_frame_of(*name)) continue;
+    std::error_code ignored;
+    if (fs::status(*name, ignored).type() == fs::file_type::not_found) return *name;
+  }
+  return "";
+}
+
+/// Leaves out the pairs whose files do not exist, with a warning. Error (kInput): no pair is left.
+core::Result<ListedFrames> leave_out_missing(const std::string& folder, Layout& layout, core::Log& log) {
+  ListedFrames listed;
+  std::vector<PairInfo> there;
+  std::string first;
+  for (PairInfo& pair : layout.pairs) {
+    listed.stamps.push_back(pair.stamp);
+    const std::string missing = missing_file(layout, pair);
+    listed.places.push_back(missing.empty() ? std::optional(there.size()) : std::nullopt);
+    if (missing.empty()) there.push_back(std::move(pair));
+    if (first.empty()) first = missing;
   }
 
-  const double start = pairs.front().stamp;
-  const double duration = pairs.back().stamp - start;
+  const std::size_t all = layout.pairs.size();
+  layout.pairs = std::move(there);
+  if (layout.pairs.empty()) {
+    return core::input_error(fmt::format(
+        "{}: none of its {} frames has both its files; the first that is missing: {}", folder, all, first));
+  }
+  if (layout.pairs.size() < all) {
+    log.warning(
+        fmt::format("{}: {} of {} frames are missing and left out: their files do not exist (the first: {})",
+                    folder, all - layout.pairs.size(), all, first));
+  }
+  return listed;
+}
+
+/// Keeps the part that the options name, of all frames that are listed; those of it that are missing are
+/// counted.
+core::Result<void> select(const OpenOptions& options, const std::string& folder, const ListedFrames& listed,
+                          Layout& layout) {
+  const auto selected = selected_frames(folder, listed.stamps, options);
+  if (!selected) return tl::unexpected(selected.error());
   std::vector<PairInfo> kept;
-  std::size_t inside = 0;
-  for (PairInfo& pair : pairs) {
-    const double t = pair.stamp - start;
-    if (!(t >= options.from_s && t <= options.to_s)) continue;
-    if (inside++ % static_cast<std::size_t>(options.every) == 0) kept.push_back(std::move(pair));
+  for (const std::size_t i : *selected) {
+    if (listed.places[i]) kept.push_back(std::move(layout.pairs[*listed.places[i]]));
   }
 
-  if (kept.empty() && options.to_s == OpenOptions().to_s) {
-    return core::usage_error(
-        fmt::format("{}: nothing lies after {} s (--from); the recording ends at {:.2f} s", folder,
-                    options.from_s, duration));
-  }
-
+  layout.missing = selected->size() - kept.size();
   if (kept.empty()) {
-    return core::usage_error(
-        fmt::format("{}: nothing lies between {} s and {} s (--from, --to): the recording is {:.2f} s long",
-                    folder, options.from_s, options.to_s, duration));
+    return core::input_error(
+        fmt::format("{}: the files of all {} frames that --from, --to and --every name are missing", folder,
+                    selected->size()));
   }
-
-  pairs = std::move(kept);
+  layout.pairs = std::move(kept);
   return {};
 }
 
@@ -207,8 +242,11 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
         folder.string()));
   }
   if (!layout) return tl::unexpected(layout.error());
+  layout->folder = folder;
   round_stamps(layout->pairs);
   drop_same_stamps(folder.string(), layout->pairs, log);
+  const auto listed = leave_out_missing(folder.string(), *layout, log);
+  if (!listed) return tl::unexpected(listed.error());
   if (!chosen) return tl::unexpected(chosen.error());
 
   auto camera = complete_camera(folder, *chosen, *layout, log);
@@ -218,7 +256,7 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
   layout->color_reduction = stored_reduction(*layout, *camera);
   layout->gives_odometry = layout->truth_is_odometry && options.poses == PoseUse::kPrior;
   if (auto kinds = check_image_kinds(*layout, *camera, log); !kinds) return tl::unexpected(kinds.error());
-  if (auto selected = select(options, folder.string(), layout->pairs); !selected)
+  if (auto selected = select(options, folder.string(), *listed, *layout); !selected)
     return tl::unexpected(selected.error());
 
   for (PairInfo& pair : layout->pairs) pair.depth_stamp += camera->depth_delay_s;

@@ -76,35 +76,24 @@ std::string no_common_time(const std::string& color_name, const std::vector<Stam
       depth.front().stamp, depth.back().stamp);
 }
 
-core::Result<void> check_files(const std::string& list, const std::vector<StampedFile>& files,
-                               core::Log& log) {
-  std::size_t missing = 0;
+core::Result<void> check_files(const std::string& list, const std::vector<StampedFile>& files) {
   bool denied = false;
-  const StampedFile* first = nullptr;
   for (const StampedFile& file : files) {
     std::error_code why;
-    if (std::filesystem::exists(file.file, why)) continue;
-    if (missing++ > 0) continue;
-    first = &file;
-    denied = why == std::errc::permission_denied;
+    if (std::filesystem::exists(file.file, why)) return {};
+    if (&file == &files.front()) denied = why == std::errc::permission_denied;
   }
 
-  if (missing == 0) return {};
-  if (missing == files.size() && denied) {
+  const StampedFile& first = files.front();
+  if (denied) {
     return core::input_error(
         fmt::format("{}:{}: names {}, which cannot be reached: no permission for its folder", list,
-                    first->line, first->file));
+                    first.line, first.file));
   }
-  if (missing == files.size()) {
-    return core::input_error(
-        fmt::format("{}:{}: names {}, which does not exist, and none of its {} files does; copy the image "
-                    "folder beside the list or correct the list",
-                    list, first->line, first->file, files.size()));
-  }
-
-  log.warning(fmt::format("{}:{}: {} of {} files do not exist, these frames are skipped (first: {})", list,
-                          first->line, missing, files.size(), first->file));
-  return {};
+  return core::input_error(
+      fmt::format("{}:{}: names {}, which does not exist, and none of its {} files does; copy the image "
+                  "folder beside the list or correct the list",
+                  list, first.line, first.file, files.size()));
 }
 
 }  // namespace plumbline::dataset

@@ -22,8 +22,10 @@ std::vector<std::size_t> spread(std::size_t count, std::size_t samples) {
 std::string to_text(const FrameSource& source) {
   constexpr std::size_t kSamples = 5;
   const sensor::Camera& camera = source.camera();
-  std::string text =
-      fmt::format("recording: {} ({})\npairs: {}\n", source.name(), source.format(), source.size());
+  std::string text = fmt::format("recording: {} ({})\n", source.name(), source.format());
+  if (source.missing() > 0)
+    text += fmt::format("missing: {} pairs, whose files do not exist\n", source.missing());
+  text += fmt::format("pairs: {}\n", source.size());
 
   std::vector<double> steps;
   for (std::size_t i = 1; i < source.size(); ++i)

@@ -28,9 +28,11 @@ struct ConvertSummary {
 /// as it is; depth as 16UC1 millimetres or 32FC1 metres; CameraInfo, /tf_static, chunks of zstd, and the
 /// whole camera file in a metadata record), else a TUM folder (images as they are stored, float depth as
 /// float TIFF, camera.yaml, groundtruth.txt if there is truth). Mapping the copy gives the bytes of the
-/// original. Memory does not grow with the recording; `out` appears when all is written. Errors: kUsage
+/// original. A frame with an image that cannot be read, is of another size or kind than the camera's, or is
+/// behind a link out of the recording's folder is left out and counted; warnings name the first five. Memory
+/// does not grow with the recording; `out` appears when all is written. Errors: kUsage
 /// (`out` is there and was not written by this function, or has an ending of files that are not
-/// written), kInput (no frame can be read), kOutput.
+/// written), kInput (no frame can be copied), kOutput.
 core::Result<ConvertSummary> convert_recording(const FrameSource& source, const std::filesystem::path& out,
                                                const ConvertOptions& options, core::Log& log);
 

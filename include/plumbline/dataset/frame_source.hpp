@@ -32,11 +32,12 @@ struct PairInfo {
   int camera = -1;  ///< position among Layout::frame_cameras; -1: the recording's camera
 };
 
-/// An image as a recording has it: the bytes of a file, or pixels.
+/// An image as a recording has it: its pixels, and the bytes of its file where it has one.
 struct StoredImage {
-  std::string ending;  ///< extension of a file with these bytes: ".png", ".jpg" ...; "": there are pixels
+  std::string ending;  ///< extension of a file with these bytes: ".png", ".jpg" ...; "": only pixels
   std::vector<std::uint8_t> bytes;  ///< bytes of the file
   cv::Mat pixels;                   ///< as read_image gives them
+  bool linked_out = false;          ///< a link in the recording's folder leads out of it to the file
 };
 
 struct StoredPair {
@@ -62,11 +63,14 @@ class FrameSource {
       const = 0;  ///< one of layout_names(), "mcap", "db3", "bag" or "synth"
   [[nodiscard]] virtual const sensor::Camera& camera() const = 0;
   [[nodiscard]] virtual std::size_t size() const = 0;
+  /// Number of frames that the recording lists and that are not among size(): their files do not exist.
+  [[nodiscard]] virtual std::size_t missing() const { return 0; }
   [[nodiscard]] virtual PairInfo info(std::size_t index) const = 0;
   /// Decoded, rectified, depth in metres, gray filled in. An error is about this frame only: skip it.
   [[nodiscard]] virtual core::Result<sensor::RgbdFrame> read(std::size_t index) const = 0;
   /// The unprocessed images of a frame, for copies of the recording: with camera() they make the same frame.
-  /// Errors (kInput) are about this frame only, or say that the source has no stored images.
+  /// Both have pixels, of the camera's size. Errors (kInput) are about this frame only, as those of read(),
+  /// or say that the source has no stored images.
   [[nodiscard]] virtual core::Result<StoredPair> stored(std::size_t /*index*/) const {
     return core::input_error(name() + ": has no stored images");
   }

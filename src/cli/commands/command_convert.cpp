@@ -70,7 +70,8 @@ core::Result<void> convert(Session& session, ConvertRequest& request) {
 
   if (summary->stopped) console.warning("stopped: the copy ends here");
   if (summary->unreadable > 0)
-    console.warning(fmt::format("{} frames cannot be read and are left out", summary->unreadable));
+    console.warning(fmt::format("{} of {} frames cannot be copied and are left out", summary->unreadable,
+                                summary->written + summary->unreadable));
   if (!session.quiet) print("written    {} frames to {}\n", summary->written, request.output.string());
   return {};
 }

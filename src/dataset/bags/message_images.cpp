@@ -33,10 +33,9 @@ core::Result<StoredImage> MessageImages::stored(const std::string& name) const {
     if (file && (is_png(message->data) || is_jpeg(message->data))) {
       stored.ending = is_png(message->data) ? ".png" : ".jpg";
       stored.bytes = message->data;
-      return stored;
     }
   }
-  auto pixels = image(name);
+  auto pixels = stored.bytes.empty() ? image(name) : decode_image(name, stored.bytes);
   if (!pixels) return tl::unexpected(pixels.error());
   stored.pixels = std::move(*pixels);
   return stored;

@@ -11,7 +11,6 @@
 #include <system_error>
 
 #include "convert/copy_target.hpp"
-#include "images/image_decoders.hpp"
 #include "layout.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/core/own_files.hpp"
@@ -155,8 +154,22 @@ core::Result<void> put_in_place(const fs::path& written, const fs::path& out, bo
                                         out.string(), problem.message(), written.string()));
 }
 
+/// Refuses images that a link brings into the recording's folder: what lies elsewhere is not the recording's.
+core::Result<void> check_links(const PairInfo& info, const StoredPair& pair) {
+  for (const auto& [file, image] :
+       {std::pair(&info.color_file, &pair.color), std::pair(&info.depth_file, &pair.depth)}) {
+    if (!image->linked_out) continue;
+    return core::input_error(
+        fmt::format("{}: a link leads there, out of the recording's folder; put the file itself there if it "
+                    "is to be copied",
+                    *file));
+  }
+  return {};
+}
+
 core::Result<ConvertSummary> copy_frames(const FrameSource& source, CopyTarget& target,
-                                         const ConvertOptions& options) {
+                                         const ConvertOptions& options, core::Log& log) {
+  constexpr std::size_t kReportedOneByOne = 5;
   ConvertSummary summary;
   std::string first_error;
   for (std::size_t i = 0; i < source.size(); ++i) {
@@ -168,15 +181,20 @@ core::Result<ConvertSummary> copy_frames(const FrameSource& source, CopyTarget& 
     const PairInfo info = source.info(i);
     const auto pair = source.stored(i);
     core::Result<void> added;
-    if (pair) {
+    if (pair) added = check_links(info, *pair);
+    if (pair && added) {
       added = target.add(nanoseconds(info.stamp),
                          nanoseconds(info.depth_stamp - source.camera().depth_delay_s), *pair);
     }
 
     const core::Error* problem = !pair ? &pair.error() : !added ? &added.error() : nullptr;
     if (problem != nullptr && problem->kind != core::ErrorKind::kInput) return tl::unexpected(*problem);
-    if (problem != nullptr && summary.unreadable++ == 0) first_error = problem->message;
-    if (problem == nullptr) ++summary.written;
+    if (problem == nullptr) {
+      ++summary.written;
+    } else if (summary.unreadable++ < kReportedOneByOne) {
+      if (first_error.empty()) first_error = problem->message;
+      log.warning(fmt::format("frame {} is left out: {}", i, problem->message));
+    }
     if (options.progress) options.progress(i + 1);
   }
 
@@ -193,16 +211,6 @@ std::int64_t nanoseconds(double seconds) {
   return std::llroundl(static_cast<long double>(seconds) * 1e9L);
 }
 
-core::Result<cv::Mat> pixels_of(const StoredImage& image) {
-  if (image.ending.empty()) return image.pixels;
-  if (image.bytes.empty()) return core::input_error("an empty image");
-  auto decoded = is_png(image.bytes)    ? decode_png(image.bytes)
-                 : is_jpeg(image.bytes) ? decode_jpeg(image.bytes)
-                                        : decode_other(image.bytes);
-  if (decoded) return std::move(*decoded);
-  return core::input_error("a damaged image: " + decoded.error());
-}
-
 core::Result<ConvertSummary> convert_recording(const FrameSource& source, const fs::path& out,
                                                const ConvertOptions& options, core::Log& log) {
   const bool file = out.extension() == ".mcap";
@@ -212,7 +220,7 @@ core::Result<ConvertSummary> convert_recording(const FrameSource& source, const 
   auto target = file ? make_mcap_target(out, source.camera(), log) : make_tum_target(folder, source.camera());
   if (!target) return tl::unexpected(target.error());
 
-  auto summary = copy_frames(source, **target, options);
+  auto summary = copy_frames(source, **target, options, log);
   core::Result<void> done;
   const bool odometry = source.truth_is_odometry();
   if (odometry)

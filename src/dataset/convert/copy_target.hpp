@@ -40,7 +40,4 @@ std::unique_ptr<CopyTarget> make_message_target(std::unique_ptr<BagWriter> bag, 
 /// since 1970 resolves no more.
 std::int64_t nanoseconds(double seconds);
 
-/// The image's pixels, decoded where they are a file's bytes. Error (kInput): damaged.
-core::Result<cv::Mat> pixels_of(const StoredImage& image);
-
 }  // namespace plumbline::dataset

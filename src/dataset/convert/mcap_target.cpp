@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "bags/bag_parts.hpp"
 #include "convert/copy_target.hpp"
@@ -74,8 +75,6 @@ class McapTarget final : public CopyTarget {
   }
 
   core::Result<void> add(std::int64_t color_ns, std::int64_t depth_ns, const StoredPair& pair) override {
-    auto depth = pixels_of(pair.depth);
-    if (!depth) return tl::unexpected(depth.error());
     if (!begun_) begin(color_ns);
 
     const MessageHeader header{color_ns, kColorFrame};
@@ -86,7 +85,7 @@ class McapTarget final : public CopyTarget {
 
     const MessageHeader depth_header{depth_ns, own_depth_camera_ ? kDepthFrame : kColorFrame};
     bag_->write(depth_topic_ + (own_depth_camera_ ? "/image_rect_raw" : "/image_raw"),
-                depth_message(*depth, depth_header));
+                depth_message(pair.depth.pixels, depth_header));
     bag_->write(depth_topic_ + "/camera_info", own_depth_camera_
                                                    ? info_of(*camera_.depth, camera_.depth_lens, depth_header)
                                                    : info_of(stored, camera_.lens(), depth_header));
@@ -107,19 +106,20 @@ class McapTarget final : public CopyTarget {
 
   /// Writes JPEG unchanged, everything else as pixels; returns the image's size.
   core::Result<cv::Size> write_color(const MessageHeader& header, const StoredImage& image) {
-    auto pixels = pixels_of(image);
-    if (!pixels) return tl::unexpected(pixels.error());
+    cv::Mat pixels = image.pixels;
+    if (pixels.type() == CV_16UC4)
+      cv::cvtColor(pixels, pixels, cv::COLOR_BGRA2BGR);  // ROS has no name for it
     const std::string topic = std::string(kColorTopic) + "/image_raw";
-    const std::string encoding = encoding_of_pixels(*pixels);
+    const std::string encoding = encoding_of_pixels(pixels);
     if (image.ending == ".jpg" || image.ending == ".jpeg") {
       bag_->write(topic + "/compressed",
                   CompressedImageMessage{header, "bgr8; jpeg compressed bgr8", image.bytes});
-    } else if (encoding.empty() || pixels->depth() == CV_32F || encoding == "16UC1") {
+    } else if (encoding.empty()) {
       return core::input_error("a colour image in a format for which ROS has no name");
     } else {
-      bag_->write(topic, message_of(*pixels, header, encoding));
+      bag_->write(topic, message_of(pixels, header, encoding));
     }
-    return pixels->size();
+    return pixels.size();
   }
 
   /// Millimetres unchanged; other units as metres, which are converted back without loss.

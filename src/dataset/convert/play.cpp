@@ -20,6 +20,7 @@ using Seconds = std::chrono::duration<double>;
 constexpr std::chrono::milliseconds kLookForListeners(20);     // for listeners, and whether to stop
 constexpr std::chrono::milliseconds kAfterFirstListener(500);  // its other subscriptions may come
 constexpr std::chrono::milliseconds kLastWords(2000);
+constexpr std::size_t kReportedOneByOne = 5;  // frames that are left out
 
 /// A bag whose messages are sent as they are written. The first frame is only read: subscribers have to know
 /// the topics before it is sent.
@@ -152,6 +153,8 @@ class Player {
 
       const core::Error* problem = !pair ? &pair.error() : !added ? &added.error() : nullptr;
       if (problem != nullptr && summary_.unreadable++ == 0) first_error_ = problem->message;
+      if (problem != nullptr && summary_.unreadable <= kReportedOneByOne)
+        log_.warning(fmt::format("frame {} is left out: {}", i, problem->message));
       if (problem == nullptr) ++summary_.published;
       ++frames_;
       if (options_.progress) options_.progress(frames_, options_.loop ? 0 : source_.size());

@@ -54,6 +54,7 @@ class TumTarget final : public CopyTarget {
                                   const StoredImage& image) {
     StoredImage file = image;
     if (file.ending.empty()) {
+      if (file.pixels.depth() == CV_64F) file.pixels.convertTo(file.pixels, CV_32F);
       const bool floats = file.pixels.depth() == CV_32F;
       auto bytes = floats ? encode_tiff(file.pixels) : encode_png(file.pixels, 1);
       if (!bytes) return tl::unexpected(bytes.error());

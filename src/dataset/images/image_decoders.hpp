@@ -8,6 +8,8 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "plumbline/core/error.hpp"
+
 namespace plumbline::dataset {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -24,6 +26,8 @@ Decoded decode_png(const Bytes& file);
 /// libjpeg with lost data treated as an error: by default it would fill missing parts with grey.
 Decoded decode_jpeg(const Bytes& file);
 Decoded decode_other(const Bytes& file);
+/// Any of these. Error (kInput): names the image and what is wrong.
+core::Result<cv::Mat> decode_image(const std::string& name, const Bytes& file);
 /// NumPy's .npy: an array of two dimensions, or three of which one is 1, of float32 (CV_32FC1), float64
 /// (CV_64FC1) or uint16 (CV_16UC1) in little endian, row by row.
 bool is_npy(const Bytes& file);

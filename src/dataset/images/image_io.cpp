@@ -10,6 +10,7 @@
 #include "frame_images.hpp"
 #include "images/image_decoders.hpp"
 #include "images/image_formats.hpp"
+#include "plumbline/core/git_lfs.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/core/shortage.hpp"
 #include "plumbline/core/text.hpp"
@@ -37,6 +38,15 @@ core::Result<Bytes> read_bytes(const std::filesystem::path& file) {
   return bytes;
 }
 
+/// The ending that a copy's file has: the file's own, or that of its content where it has none that can stand
+/// in a list.
+std::string ending_of_copy(const std::filesystem::path& file, const Bytes& bytes) {
+  const std::string own = core::ending_of(file);
+  const auto plain = [](unsigned char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9'); };
+  if (own.size() > 1 && std::all_of(own.begin() + 1, own.end(), plain)) return own;
+  return is_png(bytes) ? ".png" : is_jpeg(bytes) ? ".jpg" : "";
+}
+
 }  // namespace
 
 Decoded decode_other(const Bytes& file) {
@@ -47,23 +57,29 @@ Decoded decode_other(const Bytes& file) {
   return image;
 }
 
+core::Result<cv::Mat> decode_image(const std::string& name, const Bytes& file) {
+  if (file.empty()) return core::input_error(name + ": truncated or damaged: empty file");
+  Decoded image = is_png(file)    ? decode_png(file)
+                  : is_jpeg(file) ? decode_jpeg(file)
+                  : is_npy(file)  ? decode_npy(file)
+                                  : decode_other(file);
+  if (image) return std::move(*image);
+  const std::string_view text(reinterpret_cast<const char*>(file.data()), file.size());
+  if (core::begins_as_lfs_pointer(text)) return core::input_error(name + ": " + core::kLfsPointer);
+  return core::input_error(fmt::format("{}: truncated or damaged: {}", name, image.error()));
+}
+
 core::Result<StoredImage> stored_file(const std::string& file) {
   auto bytes = read_bytes(file);
   if (!bytes) return tl::unexpected(bytes.error());
-  return StoredImage{core::ending_of(file), std::move(*bytes), {}};
+  auto pixels = decode_image(file, *bytes);
+  if (!pixels) return tl::unexpected(pixels.error());
+  return StoredImage{ending_of_copy(file, *bytes), std::move(*bytes), std::move(*pixels)};
 }
 
 core::Result<cv::Mat> read_image(const std::filesystem::path& file) {
   auto bytes = read_bytes(file);
-  if (!bytes) return tl::unexpected(bytes.error());
-  if (bytes->empty())
-    return core::input_error(fmt::format("{}: truncated or damaged: empty file", file.string()));
-  Decoded image = is_png(*bytes)    ? decode_png(*bytes)
-                  : is_jpeg(*bytes) ? decode_jpeg(*bytes)
-                  : is_npy(*bytes)  ? decode_npy(*bytes)
-                                    : decode_other(*bytes);
-  if (image) return std::move(*image);
-  return core::input_error(fmt::format("{}: truncated or damaged: {}", file.string(), image.error()));
+  return bytes ? decode_image(file.string(), *bytes) : tl::unexpected(bytes.error());
 }
 
 core::Result<std::vector<std::uint8_t>> encode_png(const cv::Mat& image, int level) {

@@ -79,7 +79,7 @@ core::Result<std::vector<StampedFile>> read_list(const fs::path& list, core::Log
 
   if (files.empty()) return core::input_error(fmt::format("{}: names no image", list.string()));
   sort_and_unique(list.string(), files, log);
-  if (auto there = check_files(list.string(), files, log); !there) return tl::unexpected(there.error());
+  if (auto there = check_files(list.string(), files); !there) return tl::unexpected(there.error());
 
   return files;
 }
@@ -154,7 +154,7 @@ core::Result<std::vector<PairInfo>> read_associations(const fs::path& list, core
   }
 
   for (const auto* files : {&color, &depth}) {
-    if (auto there = check_files(list.string(), *files, log); !there) return tl::unexpected(there.error());
+    if (auto there = check_files(list.string(), *files); !there) return tl::unexpected(there.error());
   }
 
   std::vector<PairInfo> pairs;

@@ -92,6 +92,21 @@ TEST_F(Redwood, MatchesByNumber) {
   EXPECT_DOUBLE_EQ((*(*source)->truth())[1].stamp, (*source)->info(1).stamp);
 }
 
+TEST_F(Redwood, LinksToNothingAreMissingFrames) {
+  write_camera("depth_scale: 1000\n");
+  for (int i = 0; i < 4; ++i) {
+    write_image("color/" + std::to_string(i) + ".png", color_image(i));
+    write_image("depth/" + std::to_string(i) + ".png", depth_image(2000));
+  }
+  std::filesystem::remove(folder_ / "depth/2.png");
+  std::filesystem::create_symlink("nowhere/2.png", folder_ / "depth/2.png");
+  const auto source = open();
+  ASSERT_TRUE(source) << source.error().message;
+  EXPECT_EQ((*source)->size(), 3U);
+  EXPECT_EQ((*source)->missing(), 1U);
+  EXPECT_THAT(log_.warnings, AllOf(HasSubstr("1 of 4 frames are missing"), HasSubstr("depth/2.png")));
+}
+
 TEST_F(Redwood, MicrosecondsInNamesAreStamps) {
   write_camera("depth_scale: 1000\n");
   write_image("rgb/0000001-000000000000.jpg", color_image(1));

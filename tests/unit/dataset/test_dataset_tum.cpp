@@ -133,16 +133,49 @@ TEST_F(Tum, AllFilesMissing) {
               AllOf(HasSubstr("rgb.txt:2"), HasSubstr("rgb/0.png"), HasSubstr("3 files")));
 }
 
-TEST_F(Tum, SomeFilesMissingAreSkippedWhenRead) {
-  write_tum(4);
-  std::filesystem::remove(folder_ / "rgb/1.png");
+TEST_F(Tum, FramesWithoutFilesAreLeftOutAndCounted) {
+  write_tum(20);
+  for (int i = 0; i < 20; ++i) {
+    if (i % 5 == 0) std::filesystem::remove(folder_ / ("rgb/" + std::to_string(i) + ".png"));
+    if (i > 15) std::filesystem::remove(folder_ / ("depth/" + std::to_string(i) + ".png"));
+  }
   const auto source = open();
   ASSERT_TRUE(source) << source.error().message;
-  EXPECT_THAT(log_.warnings, AllOf(HasSubstr("rgb.txt:3"), HasSubstr("1 of 4"), HasSubstr("rgb/1.png")));
-  EXPECT_TRUE((*source)->read(0));
-  const auto missing = (*source)->read(1);
-  ASSERT_FALSE(missing);
-  EXPECT_THAT(missing.error().message, HasSubstr("rgb/1.png"));
+  ASSERT_EQ((*source)->size(), 12U);
+  EXPECT_EQ((*source)->missing(), 8U);
+  EXPECT_THAT(log_.warnings, AllOf(HasSubstr("8 of 20 frames are missing"), HasSubstr("rgb/0.png")));
+  EXPECT_THAT((*source)->info(4).color_file, HasSubstr("rgb/6.png"));
+  for (std::size_t i = 0; i < 12; ++i) {
+    const auto frame = (*source)->read(i);
+    ASSERT_TRUE(frame) << frame.error().message;
+    EXPECT_EQ(frame->index, static_cast<std::int64_t>(i));
+  }
+  EXPECT_THAT(to_text(**source), AllOf(HasSubstr("missing: 8 pairs"), HasSubstr("pairs: 12\n")));
+}
+
+TEST_F(Tum, APartIsOneOfAllListedFrames) {
+  write_tum(10);
+  for (const int i : {0, 4, 5}) std::filesystem::remove(folder_ / ("rgb/" + std::to_string(i) + ".png"));
+  OpenOptions options;
+  options.from_s = 0.15;
+  options.every = 2;
+  const auto source = open(options);
+  ASSERT_TRUE(source) << source.error().message;
+  ASSERT_EQ((*source)->size(), 3U);  // of 0.2, 0.4, 0.6 and 0.8 s after the first that is listed
+  EXPECT_THAT((*source)->info(0).color_file, HasSubstr("rgb/2.png"));
+  EXPECT_THAT((*source)->info(1).color_file, HasSubstr("rgb/6.png"));
+  EXPECT_EQ((*source)->missing(), 1U);
+  options.to_s = 0.15;
+  options.from_s = 0.0;
+  options.every = 5;
+  EXPECT_THAT(open_error(options), HasSubstr("the files of all 1 frames"));
+}
+
+TEST_F(Tum, NoFrameHasBothItsFiles) {
+  write_tum(4);
+  for (const int i : {0, 1}) std::filesystem::remove(folder_ / ("rgb/" + std::to_string(i) + ".png"));
+  for (const int i : {2, 3}) std::filesystem::remove(folder_ / ("depth/" + std::to_string(i) + ".png"));
+  EXPECT_THAT(open_error(), AllOf(HasSubstr("none of its 4 frames"), HasSubstr("rgb/0.png")));
 }
 
 TEST_F(Tum, NothingInCommonInTime) {
