@@ -50,6 +50,8 @@ class RobotRecordings : public dataset::FrameSource {
   [[nodiscard]] std::size_t size() const override {
     return live() ? recordings_.front()->size() : order_.size();
   }
+  /// Sum over all recordings.
+  [[nodiscard]] std::size_t missing() const override;
   [[nodiscard]] dataset::PairInfo info(std::size_t index) const override;
   [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override;
   /// True if the recording is live, which only a single one may be.

@@ -7,12 +7,13 @@
 #include <vector>
 
 #include "plumbline/dataset/live.hpp"
+#include "plumbline/dataset/selection.hpp"
 #include "plumbline/synth/source.hpp"
 
 namespace plumbline::pipeline {
 namespace {
 
-/// The frames of a source that have the given indices.
+/// The frames of a source that have the given indices, numbered from 0.
 class SelectedFrames : public dataset::FrameSource {
  public:
   SelectedFrames(std::unique_ptr<dataset::FrameSource> source, std::vector<std::size_t> indices)
@@ -26,7 +27,9 @@ class SelectedFrames : public dataset::FrameSource {
     return source_->info(indices_.at(index));
   }
   [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override {
-    return source_->read(indices_.at(index));
+    auto frame = source_->read(indices_.at(index));
+    if (frame) frame->index = static_cast<std::int64_t>(index);
+    return frame;
   }
   [[nodiscard]] std::optional<geometry::Trajectory> truth() const override { return source_->truth(); }
 
@@ -35,26 +38,15 @@ class SelectedFrames : public dataset::FrameSource {
   std::vector<std::size_t> indices_;
 };
 
-/// Frames of `source` from `from_s` to `to_s` seconds after the first one, every n-th of them. Error
-/// (kUsage): none is left.
+/// The part of `source` that the options name. Error (kUsage): nothing lies there.
 core::Result<std::unique_ptr<dataset::FrameSource>> select_frames(
-    std::unique_ptr<dataset::FrameSource> source, double from_s, double to_s, int every) {
-  if (every < 1)
-    return core::usage_error(fmt::format("every: {} is out of range (allowed: at least 1)", every));
-
-  std::vector<std::size_t> indices;
-  for (std::size_t i = 0; i < source->size(); i += static_cast<std::size_t>(every)) {
-    const double elapsed = source->info(i).stamp - source->info(0).stamp;
-    if (elapsed >= from_s && elapsed <= to_s) indices.push_back(i);
-  }
-
-  if (indices.empty()) {
-    return core::usage_error(fmt::format("{}: no frame lies between {:g} s and {:g} s after the first",
-                                         source->name(), from_s, to_s));
-  }
-
-  if (indices.size() == source->size()) return source;
-  return std::make_unique<SelectedFrames>(std::move(source), std::move(indices));
+    std::unique_ptr<dataset::FrameSource> source, const dataset::OpenOptions& options) {
+  std::vector<double> stamps;
+  for (std::size_t i = 0; i < source->size(); ++i) stamps.push_back(source->info(i).stamp);
+  auto indices = dataset::selected_frames(source->name(), stamps, options);
+  if (!indices) return tl::unexpected<core::Error>(indices.error());
+  if (indices->size() == source->size()) return source;
+  return std::make_unique<SelectedFrames>(std::move(source), std::move(*indices));
 }
 
 constexpr double kForever_s = 1e299;  // values of --for from here on mean no limit
@@ -96,7 +88,7 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_input(const std::string
 
   auto source = synth::open_synth(input, scenes_folder, executor, log);
   if (!source) return source;
-  return select_frames(std::move(*source), options.from_s, options.to_s, options.every);
+  return select_frames(std::move(*source), options);
 }
 
 }  // namespace plumbline::pipeline

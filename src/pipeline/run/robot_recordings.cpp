@@ -70,6 +70,12 @@ dataset::PairInfo RobotRecordings::info(std::size_t index) const {
   return of(at).info(at.index);
 }
 
+std::size_t RobotRecordings::missing() const {
+  std::size_t missing = 0;
+  for (const auto& recording : recordings_) missing += recording->missing();
+  return missing;
+}
+
 std::string RobotRecordings::doubt() const {
   for (const auto& recording : recordings_) {
     if (std::string doubt = recording->doubt(); !doubt.empty()) return doubt;

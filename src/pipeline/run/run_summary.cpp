@@ -108,8 +108,11 @@ std::string text_of(const Json& summary) {
                     count(frames.at("read")) + count(frames.at("unreadable")), count(frames.at("available")));
   }
 
-  text += fmt::format("frames     {} read, {} tracked ({:.1f} %), {} unreadable\n", count(frames.at("read")),
-                      count(frames.at("tracked")), tracked_percent(frames), count(frames.at("unreadable")));
+  const std::size_t missing = count(frames.at("missing"));
+  text +=
+      fmt::format("frames     {} read, {} tracked ({:.1f} %), {} unreadable{}\n", count(frames.at("read")),
+                  count(frames.at("tracked")), tracked_percent(frames), count(frames.at("unreadable")),
+                  missing > 0 ? fmt::format(", {} missing", missing) : "");
   if (count(frames.at("odometry")) > 0) {
     text += fmt::format("poses      of the recorder's own odometry started the search in {} frames\n",
                         count(frames.at("odometry")));

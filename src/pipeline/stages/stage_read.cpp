@@ -85,6 +85,7 @@ class ReadStage : public Stage {
     frames["read"] = read_.load();
     frames["resumed"] = resumed_;
     frames["unreadable"] = unreadable_.load();
+    frames["missing"] = source_->missing();
     frames["odometry"] = odometry_.load();
     if (source_->live()) summary["live"] = live_section(source_->report());
   }

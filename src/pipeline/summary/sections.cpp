@@ -28,6 +28,7 @@ Json empty_sections() {
             {"read", 0},
             {"resumed", 0},
             {"unreadable", 0},
+            {"missing", 0},
             {"odometry", 0},
             {"tracked", 0},
             {"lost", 0},
@@ -135,16 +136,18 @@ std::string left_out_of_map_text(const Json& cloud) {
 void doubt_lost_frames(const Json& summary, std::vector<Doubt>& reasons) {
   const Json& frames = summary.at("frames");
   const auto count = [&](const char* name) { return frames.at(name).get<std::size_t>(); };
-  const std::size_t all = count("read") + count("unreadable");
+  const std::size_t missing = count("missing");
+  const std::size_t all = count("read") + count("unreadable") + missing;
   const std::size_t without = all - std::min(all, count("tracked"));
   const double percent = all > 0 ? 100.0 * static_cast<double>(without) / static_cast<double>(all) : 0.0;
   if (percent <= kMostLostPercent) return;
+  const std::string none = missing > 0 ? fmt::format(", {} without files", missing) : "";
   reasons.push_back(
       {Doubt::About::kLostFrames, fmt::format("{} of {} frames have no pose ({:.1f} %; up to {:.0f} % would "
-                                              "be trusted): {} lost, {} unreadable; "
+                                              "be trusted): {} lost, {} unreadable{}; "
                                               "the longest loss is {} frames",
                                               without, all, percent, kMostLostPercent, count("lost"),
-                                              count("unreadable"), count("longest_loss"))});
+                                              count("unreadable"), none, count("longest_loss"))});
 }
 
 void doubt_empty_cloud(const Json& summary, std::vector<Doubt>& reasons) {

@@ -67,6 +67,68 @@ TEST_F(BadInput, ManyBadFramesAreSummarisedAndNotTrusted) {
   EXPECT_NE(summary["reason"].get<std::string>().find("20 unreadable"), std::string::npos) << summary;
 }
 
+TEST_F(BadInput, FilesThatGitLfsDidNotFetchAreNamed) {
+  const std::string pointer =
+      "version https://git-lfs.github.com/spec/v1\n"
+      "oid sha256:4d7a214614ab2935c943f9e0ff69d22eadbb8f32b1258daaa5e2ca24d17e2393\nsize 12345\n";
+  const std::vector<std::string> told = {"is a Git LFS pointer, not the file itself", "git lfs pull"};
+  for (const char* name :
+       {"a.mcap", "a.db3", "a.bag", "a.mkv", "a.zip", "a.ply", "a.pcd", "a.xyz", "map.db"}) {
+    write(name, pointer);
+    expect_refused(run(std::string("info ") + name), 3, told);
+  }
+  for (const char* name : {"a.mcap", "a.mkv", "a.zip"})
+    expect_refused(run(std::string("map ") + name + " -o out"), 3, told);
+
+  fs::create_directory(path("bag"));
+  write("bag/bag_0.mcap", pointer);
+  expect_refused(run("map bag -o out"), 3, told);
+  write("truth.txt", pointer);
+  expect_refused(run("evaluate trajectory truth.txt truth.txt"), 3, told);
+
+  write_wall(path("wall"));
+  write("camera.yaml", pointer);
+  expect_refused(run(std::string(kMap) + "--camera camera.yaml"), 2, told);
+  for (int f = 0; f < 12; ++f) write("wall/rgb/" + frame_name(f), pointer);
+  expect_refused(run(kMap), 3, told);
+  write("wall/rgb.txt", pointer);
+  expect_refused(run(kMap), 3, told);
+}
+
+TEST_F(BadInput, FramesWithoutFilesAreCountedFirst) {
+  WallRecording wall;
+  wall.frames = 30;
+  write_wall(path("wall"), wall);
+  for (int f = 5; f < 25; ++f) fs::remove(path("wall/depth/" + frame_name(f)));
+  const Outcome told = run("info wall");
+  EXPECT_EQ(told.code, 0) << told;
+  EXPECT_TRUE(told.told("20 of 30 frames are missing and left out")) << told;
+  EXPECT_NE(told.out.find("missing: 20 pairs, whose files do not exist\npairs: 10\n"), std::string::npos)
+      << told;
+
+  const Outcome o = run(kMap);
+  EXPECT_EQ(o.code, 4) << o;
+  EXPECT_TRUE(o.told("20 of 30 frames are missing and left out")) << o;
+  const nlohmann::json summary = read_json(path("out/summary.json"));
+  EXPECT_EQ(summary["frames"]["available"], 10);
+  EXPECT_EQ(summary["frames"]["read"], 10);
+  EXPECT_EQ(summary["frames"]["unreadable"], 0);
+  EXPECT_EQ(summary["frames"]["missing"], 20);
+  EXPECT_NE(summary["reason"].get<std::string>().find("20 without files"), std::string::npos) << summary;
+}
+
+TEST_F(BadInput, DamagedPicturesAreNotCopied) {
+  write_wall(path("wall"));
+  truncate("wall/rgb/005.png");
+  for (const char* copy : {"copy", "copy.mcap"}) {
+    const Outcome o = run(std::string("convert wall ") + copy);
+    EXPECT_EQ(o.code, 0) << o;
+    EXPECT_TRUE(o.told("005.png")) << o;
+    EXPECT_TRUE(o.told("1 of 12 frames cannot be copied and are left out")) << o;
+    EXPECT_NE(o.out.find("11 frames to"), std::string::npos) << o;
+  }
+}
+
 TEST_F(BadInput, NothingUsable) {
   write_wall(path("wall"));
   for (int f = 0; f < 12; ++f) truncate("wall/rgb/" + frame_name(f));

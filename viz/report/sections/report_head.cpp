@@ -85,6 +85,7 @@ std::string frames_text(const ReportData& data) {
   std::string text = filled(s, "{/frames/read} of {/frames/available} read, {/frames/tracked} tracked");
   if (number_at(s, "/frames/lost") > 0) text += filled(s, ", {/frames/lost} lost");
   if (number_at(s, "/frames/unreadable") > 0) text += filled(s, ", {/frames/unreadable} unreadable");
+  if (number_at(s, "/frames/missing") > 0) text += filled(s, ", {/frames/missing} missing in the recording");
   if (number_at(s, "/frames/resumed") > 0)
     text += filled(s, "; {/frames/resumed} of them by the run that this one continued");
   return text;
