@@ -17,6 +17,7 @@ enum class Motion { kScene, kHandheld, kWheeled };  ///< kScene: as the scene fi
 struct SynthOptions {
   int frames = -1;  ///< per robot; -1: the path once; more than the path has: it starts again
   int robots = 1;   ///< number of recordings
+  int layout = -1;  ///< number of a world that is made from it; -1: the scene as its file says
   int walkers = 0;  ///< number of the scene's walkers to film; they are not in reference.ply
   Texture texture = Texture::kFull;  ///< kNone: white cloth and grey floors, geometry unchanged
   Sensor sensor = Sensor::kKinect;   ///< kIdeal: no noise, no offset between stamps, no blur

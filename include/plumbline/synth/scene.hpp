@@ -13,6 +13,7 @@
 #include "plumbline/core/config.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/synth/options.hpp"
+#include "plumbline/synth/plan.hpp"
 
 namespace plumbline::synth {
 
@@ -50,6 +51,7 @@ struct Lamp {
   Eigen::Vector3d half_v;
   Eigen::Vector3d normal;  ///< unit, direction of the light
   double power = 1.0;
+  double reach = 0.0;  ///< m: the light fades to nothing there; 0: no limit
 };
 
 struct Waypoint {
@@ -88,10 +90,12 @@ struct Scene {
   std::vector<Face> faces;
   std::vector<Lamp> lamps;
   double ambient = 0.35;              ///< share of light without direction
+  double light_pitch = 0.06;          ///< m between the points of faces where light is computed
   Motion motion = Motion::kHandheld;  ///< when the options do not choose
   std::vector<RobotPath> robots;      ///< at least one
   std::vector<Walker> walkers;        ///< the options say how many of them are filmed
   std::vector<Event> events;
+  std::optional<Plan> plan;  ///< of a world made from a number
 };
 
 /// `name_or_file`: a shipped scene (a file of `scenes_folder` without .yaml) or a path. All problems of the

@@ -7,6 +7,7 @@
 
 #include "app.hpp"
 #include "option_flags.hpp"
+#include "plumbline/synth/layout.hpp"
 #include "plumbline/synth/recording.hpp"
 #include "plumbline/synth/scene.hpp"
 #include "terminal/print.hpp"
@@ -28,7 +29,7 @@ core::Result<void> film(SynthRequest& request, Session& session) {
 
   const auto pipelines = session.pipelines_folder();
   if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
-  const auto scene = synth::load_scene(request.scene, *pipelines / "scenes");
+  const auto scene = synth::open_scene(request.scene, request.options, *pipelines / "scenes");
   if (!scene) return tl::unexpected<core::Error>(scene.error());
 
   std::error_code ec;

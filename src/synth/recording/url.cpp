@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "plumbline/synth/layout.hpp"
 #include "plumbline/synth/source.hpp"
 
 namespace plumbline::synth {
@@ -68,7 +69,7 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_synth(const std::string
                                                                core::Log& log) {
   auto parsed = parse_url(url);
   if (!parsed) return tl::unexpected<core::Error>(parsed.error());
-  auto scene = load_scene(parsed->scene, scenes_folder);
+  auto scene = open_scene(parsed->scene, parsed->options, scenes_folder);
   if (!scene) return tl::unexpected<core::Error>(scene.error());
   auto world = build_world(*scene, parsed->options, executor);
   if (!world) return tl::unexpected<core::Error>(world.error());

@@ -90,6 +90,9 @@ double lamps_at(const World& world, const Vector3d& p, const Face& face) {
     // Behind the face, or too faint to be seen.
     if (to_lamp.dot(face.normal) < -1.0 || lamp.power * area < 0.012 * far2) continue;
 
+    const double share = lamp.reach > 0.0 ? far2 / (lamp.reach * lamp.reach) : 0.0;
+    if (share >= 1.0) continue;
+
     double part = 0.0;
     for (int i = -1; i <= 1; ++i) {
       for (int k = -1; k <= 1; ++k) {
@@ -103,7 +106,7 @@ double lamps_at(const World& world, const Vector3d& p, const Face& face) {
       }
     }
 
-    sum += lamp.power * area * part / 9.0;
+    sum += (1.0 - share * share) * lamp.power * area * part / 9.0;
   }
 
   return 2.2 * sum;
@@ -115,7 +118,7 @@ LightMap light_face(const World& world, std::size_t index) {
   const double u0 = bounds.min().x(), v0 = bounds.min().y();
   const double u1 = bounds.max().x(), v1 = bounds.max().y();
   const double w = std::max(u1 - u0, 1e-4), h = std::max(v1 - v0, 1e-4);
-  const double pitch = std::max(0.06, std::max(w, h) / 80.0);
+  const double pitch = std::max(world.scene.light_pitch, std::max(w, h) / 80.0);
 
   LightMap map;
   map.columns = 2 + static_cast<int>(w / pitch);

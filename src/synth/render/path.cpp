@@ -15,8 +15,6 @@ namespace {
 
 constexpr double kRamp = 0.6;  // seconds to stop before a spin and to start after it
 
-double wrap(double angle) { return angle - 2.0 * M_PI * std::round(angle / (2.0 * M_PI)); }
-
 /// 0 -> 1 with first and second derivative 0 at both ends, and its integral from 0.
 double smoother(double x) {
   x = std::clamp(x, 0.0, 1.0);

@@ -2,12 +2,16 @@
 #pragma once
 
 // The motion of one camera: C2 in position and rotation.
+#include <cmath>
 #include <vector>
 
 #include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/synth/scene.hpp"
 
 namespace plumbline::synth {
+
+/// The same angle within half a turn of 0.
+inline double wrap(double angle) { return angle - 2.0 * M_PI * std::round(angle / (2.0 * M_PI)); }
 
 /// Camera motion along a robot's waypoints. Centripetal Catmull-Rom through the waypoints gives the shape,
 /// speed and turn rate give the time, and a uniform cubic B-spline over knots in time makes position, yaw and

@@ -74,6 +74,13 @@ void Builder::polygon(const std::vector<Vector3d>& corners, const Vector3d& u_hi
   scene_.faces.push_back(std::move(face));
 }
 
+void Builder::anchor(Face& face, const Vector3d& foot) {
+  const Vector3d d = foot - face.origin;
+  const Vector2d shift(d.dot(face.u_axis), d.dot(face.v_axis));
+  face.origin = face.at(shift.x(), shift.y());
+  for (Vector2d& uv : face.polygon) uv -= shift;
+}
+
 void Builder::box(const Rigid3& f, const Vector3d& lo, const Vector3d& hi, const Skin& skin,
                   const Skin* front) {
   const auto p = [&](int x, int y, int z) {

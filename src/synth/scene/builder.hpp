@@ -36,6 +36,9 @@ class Builder {
   /// Convex flat polygon, counter-clockwise seen from outside; `u_hint` gives the texture's horizontal.
   void polygon(const std::vector<Eigen::Vector3d>& corners, const Eigen::Vector3d& u_hint, const Skin& skin);
 
+  /// Lets a face's texture count from a point, so that pieces of one surface continue each other.
+  static void anchor(Face& face, const Eigen::Vector3d& foot);
+
   /// Axis-parallel box from `lo` to `hi` in the frame `world_from_box`. The front (-y) may have its own skin.
   void box(const geometry::Rigid3& world_from_box, const Eigen::Vector3d& lo, const Eigen::Vector3d& hi,
            const Skin& skin, const Skin* front = nullptr);
@@ -102,6 +105,12 @@ struct Wall {
 };
 
 void add_wall(Builder& b, const Wall& wall);
+
+/// The panes of a window, in the frame of a wall: x along it, the middle of its thickness at y = 0.
+void add_glass(Builder& b, const geometry::Rigid3& frame, const Opening& o);
+
+/// The leaf of a door, which opens to -y.
+void add_leaf(Builder& b, const geometry::Rigid3& frame, const Wall& wall, const Opening& o);
 
 /// Panel `index` of a zigzag through `points`: mitred with its neighbours, so that no seam shows at the
 /// corners. Thickness, heights and material are those of `wall`.

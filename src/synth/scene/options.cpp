@@ -13,6 +13,8 @@ namespace plumbline::synth {
 void SynthOptions::declare(core::OptionTable& table) {
   table.integer("frames", frames, {-1, 1000000}, "", "Frames of each robot; -1 = the path once");
   table.integer("robots", robots, {1, 64}, "", "Number of recordings");
+  table.integer("layout", layout, {-1, 2147483647}, "",
+                "Number from which a home, office or corridor is made; -1 = the scene as its file says");
   table.integer("walkers", walkers, {0, 16}, "",
                 "Number of walkers in the scene: filmed, but no part of reference.ply");
   table.choice("texture", texture,

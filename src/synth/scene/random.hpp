@@ -5,6 +5,7 @@
 // the same in any order and on any number of threads.
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 
 #include "plumbline/core/random.hpp"
 
@@ -23,6 +24,13 @@ class Rng {
   std::uint64_t bits() { return mix(state_, ++counter_); }
   double uniform() { return static_cast<double>(bits() >> 11U) * 0x1.0p-53; }  ///< [0, 1)
   double uniform(double lo, double hi) { return lo + (hi - lo) * uniform(); }
+  bool chance(double share) { return uniform() < share; }
+  /// From lo to hi, both included.
+  int integer(int lo, int hi) { return lo + static_cast<int>(uniform() * (hi - lo + 1)); }
+  template <typename List>
+  const auto& pick(const List& list) {
+    return *(std::begin(list) + integer(0, static_cast<int>(std::size(list)) - 1));
+  }
   double normal() {
     const double u = 1.0 - uniform(), v = uniform();
     return std::sqrt(-2.0 * std::log(u)) * std::cos(2.0 * M_PI * v);

@@ -23,10 +23,7 @@ void add_piece(Builder& b, const Rigid3& frame, const Wall& wall, double x0, dou
     Face& face = b.scene().faces[i];
     const Vector3d foot =
         i == first + 1 ? frame * Vector3d(length, half, 0.0) : frame * Vector3d(0.0, -half, 0.0);
-    const Vector3d d = foot - face.origin;
-    const Eigen::Vector2d shift(d.dot(face.u_axis), d.dot(face.v_axis));
-    face.origin = face.at(shift.x(), shift.y());
-    for (Eigen::Vector2d& uv : face.polygon) uv -= shift;
+    Builder::anchor(face, foot);
   }
 
   if (!wall.skirting.empty() && z0 < 1e-6) {
@@ -45,6 +42,8 @@ void add_frame(Builder& b, const Rigid3& frame, const Wall& wall, const Opening&
   if (o.window)
     b.box(frame, {x0 - bar, -half - 0.08, z0 - 0.04}, {x1 + bar, half + 0.02, z0 + 0.01}, {material});
 }
+
+}  // namespace
 
 void add_glass(Builder& b, const Rigid3& frame, const Opening& o) {
   const double x0 = o.at, x1 = o.at + o.width, z0 = o.bottom, z1 = o.bottom + o.height;
@@ -71,8 +70,6 @@ void add_leaf(Builder& b, const Rigid3& frame, const Wall& wall, const Opening& 
   for (const double y : {-0.05, 0.04})
     b.box(hinge, {w - 0.14, y, 1.02}, {w - 0.03, y + 0.05, 1.05}, {"metal"});
 }
-
-}  // namespace
 
 void add_wall(Builder& b, const Wall& wall) {
   const Eigen::Vector2d along = wall.to - wall.from;

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Worlds made from a number.
+#include "plumbline/synth/scene.hpp"
+
+namespace plumbline::synth {
+
+/// Kinds of worlds that a number chooses: "home", "office", "corridor".
+const std::vector<std::string>& layout_kinds();
+
+/// The world of a kind and number (from 0), with its plan and a path for each of `robots`. The same number
+/// gives the same world. Errors: kUsage (no such kind).
+core::Result<Scene> make_layout(const std::string& kind, int number, int robots);
+
+/// A scene file or, if the options have a layout, the world of that number.
+core::Result<Scene> open_scene(const std::string& name_or_file, const SynthOptions& options,
+                               const std::filesystem::path& scenes_folder);
+
+}  // namespace plumbline::synth

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/synth/layout.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "layout/layout.hpp"
+
+namespace plumbline::synth {
+
+namespace {
+
+/// One of the worlds that a number could become; nothing if its rooms cannot all be walked through.
+std::optional<Scene> try_layout(const std::string& kind, int number, int robots, int attempt) {
+  const std::uint64_t seed = mix(static_cast<std::uint64_t>(number), static_cast<std::uint64_t>(attempt) + 1,
+                                 static_cast<std::uint64_t>(kind[0]));
+  Plan plan;
+  plan.kind = kind;
+  plan.number = number;
+
+  Rng cells(seed, 1), rooms(seed, 2), openings(seed, 3), shell(seed, 4), things(seed, 5);
+  if (!add_rooms(draw_cells(kind, cells), rooms, plan) || !add_openings(openings, plan)) return std::nullopt;
+
+  Scene scene;
+  scene.name = fmt::format("{}-{}", kind, number);
+  scene.description = fmt::format("{} from the number {}", kind, number);
+  scene.file = fmt::format("{}?layout={}", kind, number);
+  scene.ambient = 0.35;
+  Builder builder(scene);
+  build_shell(plan, shell, builder);
+  Ground ground(plan);
+  furnish(plan, ground, things, builder);
+
+  // Light of many rooms must not take longer than their making.
+  scene.light_pitch = 0.12;
+  for (Lamp& lamp : scene.lamps) lamp.reach = 6.0;
+
+  for (int robot = 0; robot < robots; ++robot) {
+    Rng walk(seed, 16 + static_cast<std::uint64_t>(robot));
+    scene.robots.push_back(plan_tour(plan, ground, robot, walk));
+    if (scene.robots.back().waypoints.empty()) return std::nullopt;
+  }
+  scene.plan = std::move(plan);
+  return scene;
+}
+
+}  // namespace
+
+const std::vector<std::string>& layout_kinds() {
+  static const std::vector<std::string> kKinds = {"home", "office", "corridor"};
+  return kKinds;
+}
+
+core::Result<Scene> make_layout(const std::string& kind, int number, int robots) {
+  const auto& kinds = layout_kinds();
+  if (std::find(kinds.begin(), kinds.end(), kind) == kinds.end()) {
+    return core::usage_error(
+        fmt::format("layout: '{}' has no layouts; {} have", kind, fmt::join(kinds, ", ")));
+  }
+  constexpr int kAttempts = 200;
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    if (auto scene = try_layout(kind, number, robots, attempt)) return std::move(*scene);
+  }
+  return core::usage_error(
+      fmt::format("layout: no {} could be made from the number {}; take another one", kind, number));
+}
+
+core::Result<Scene> open_scene(const std::string& name_or_file, const SynthOptions& options,
+                               const std::filesystem::path& scenes_folder) {
+  if (options.layout >= 0) return make_layout(name_or_file, options.layout, options.robots);
+  if (name_or_file == "home") {
+    return core::usage_error("home is made from a number: give --layout N, in an address layout=N");
+  }
+  return load_scene(name_or_file, scenes_folder);
+}
+
+}  // namespace plumbline::synth

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The steps by which a number becomes a world; each draws from its own stream of random numbers.
+#include "layout/ground.hpp"
+#include "layout/subdivision.hpp"
+#include "plumbline/synth/scene.hpp"
+#include "scene/builder.hpp"
+#include "scene/random.hpp"
+
+namespace plumbline::synth {
+
+/// Cells of a home, an office or a ring of corridors; cells of the kind "outside" are no rooms.
+Subdivision draw_cells(const std::string& kind, Rng& rng);
+
+/// Rooms with their kinds, heights and materials; false if one has no shape of a room.
+bool add_rooms(const Subdivision& cells, Rng& rng, Plan& plan);
+
+/// Doors that connect all rooms, and more of them, passages, windows, half-height walls and niches; false if
+/// rooms stay apart.
+bool add_openings(Rng& rng, Plan& plan);
+
+/// Walls, floors, ceilings, doors and windows as faces, and lamps.
+void build_shell(const Plan& plan, Rng& rng, Builder& builder);
+
+/// Furniture and columns; whatever would stand in the way of people is left out.
+void furnish(Plan& plan, Ground& ground, Rng& rng, Builder& builder);
+
+/// The camera's path through all rooms and back; empty if one of them cannot be reached.
+RobotPath plan_tour(const Plan& plan, const Ground& ground, int robot, Rng& rng);
+
+/// Frame of a face: origin at its right end seen from the room, x to its left end, y into the wall, z up.
+geometry::Rigid3 face_frame(const PlanFace& face);
+
+/// The part of a face that an opening takes, m from the origin of face_frame; nothing if it is elsewhere.
+std::optional<std::pair<double, double>> part_of_face(const Plan& plan, int room, const PlanFace& face,
+                                                      const PlanOpening& opening);
+
+}  // namespace plumbline::synth

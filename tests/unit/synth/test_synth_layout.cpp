@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <opencv2/core.hpp>
+
+#include "plumbline/core/log.hpp"
+#include "plumbline/synth/layout.hpp"
+#include "plumbline/synth/source.hpp"
+
+namespace plumbline::synth {
+namespace {
+
+using Eigen::Vector2d;
+
+double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+bool cross_each_other(const PlanFace& f, const PlanFace& g) {
+  const auto side = [](const PlanFace& face, const Vector2d& p) {
+    return cross(face.to - face.from, p - face.from) > 0.0;
+  };
+  return side(f, g.from) != side(f, g.to) && side(g, f.from) != side(g, f.to);
+}
+
+/// Area of the faces of one object of a type that belong to room `index`, by the name that its floor has.
+double floor_area(const Scene& scene, std::size_t index) {
+  double area = 0.0;
+  const std::string name = "floor of " + scene.plan->rooms[index].kind + " " + std::to_string(index);
+  for (const Face& face : scene.faces) {
+    if (scene.objects[static_cast<std::size_t>(face.object)].name == name) area += signed_area(face.polygon);
+  }
+  return area;
+}
+
+/// Rooms are closed, simple and of sensible size; their areas are those of their floors.
+void check_rooms(const Scene& scene) {
+  ASSERT_GE(scene.plan->rooms.size(), 2U) << scene.name;
+  for (std::size_t r = 0; r < scene.plan->rooms.size(); ++r) {
+    const PlanRoom& room = scene.plan->rooms[r];
+    const std::size_t n = room.faces.size();
+    for (std::size_t i = 0; i < n; ++i) {
+      EXPECT_EQ(room.faces[i].to, room.faces[(i + 1) % n].from) << scene.name;
+      for (std::size_t k = i + 2; k < n - (i == 0 ? 1 : 0); ++k)
+        EXPECT_FALSE(cross_each_other(room.faces[i], room.faces[k])) << scene.name << " room " << r;
+      const PlanWall& wall = scene.plan->walls[static_cast<std::size_t>(room.faces[i].wall)];
+      EXPECT_NEAR(std::abs(cross(wall.direction, room.faces[i].from - wall.origin)), 0.5 * wall.thickness,
+                  1e-9);
+    }
+
+    EXPECT_NEAR(room.area(), floor_area(scene, r), 1e-9) << scene.name << " room " << r;
+    if (room.kind == "corridor" || room.kind == "hall") continue;
+    EXPECT_GE(room.area(), 4.0) << scene.name << " room " << r;
+    EXPECT_LE(room.area(), 60.0) << scene.name << " room " << r;
+  }
+}
+
+/// Openings lie in the faces of their walls, apart from each other.
+void check_openings(const Scene& scene) {
+  const auto has_face = [](const PlanRoom& room, const PlanWall& wall, const PlanOpening& o) {
+    return std::any_of(room.faces.begin(), room.faces.end(), [&](const PlanFace& f) {
+      const auto [from, to] = std::minmax({wall.along(f.from), wall.along(f.to)});
+      return std::abs(cross(wall.direction, f.from - wall.origin)) < 0.51 * wall.thickness &&
+             from < o.from - 0.1 && to > o.to + 0.1;
+    });
+  };
+
+  const Plan& plan = *scene.plan;
+  for (const PlanOpening& o : plan.openings) {
+    const PlanWall& wall = plan.walls[static_cast<std::size_t>(o.wall)];
+    const PlanRoom& front = plan.rooms[static_cast<std::size_t>(o.front)];
+    EXPECT_TRUE(has_face(front, wall, o)) << scene.name;
+    EXPECT_LE(o.head, front.height);
+    EXPECT_LT(o.sill + 0.3, o.head);
+    EXPECT_LE(o.depth, wall.thickness);
+    if (o.kind == OpeningKind::kDoor) {
+      EXPECT_GE(o.width(), 0.7 - 1e-9);
+      EXPECT_LE(o.width(), 1.8);
+    }
+    if (o.back >= 0) {
+      EXPECT_TRUE(has_face(plan.rooms[static_cast<std::size_t>(o.back)], wall, o)) << scene.name;
+      EXPECT_LE(o.head, plan.rooms[static_cast<std::size_t>(o.back)].height);
+    }
+    for (const PlanOpening& other : plan.openings) {
+      if (&other == &o || other.wall != o.wall) continue;
+      EXPECT_TRUE(other.to < o.from || other.from > o.to) << scene.name;
+    }
+  }
+}
+
+/// Rooms are connected by passable openings, and the camera visits all of them without touching anything.
+void check_ways(const Scene& scene) {
+  const Plan& plan = *scene.plan;
+  std::vector<char> reached(plan.rooms.size(), 0);
+  reached[0] = 1;
+  for (std::size_t round = 0; round < plan.rooms.size(); ++round) {
+    for (const PlanOpening& o : plan.openings) {
+      if (!o.passable()) continue;
+      char &a = reached[static_cast<std::size_t>(o.front)], &b = reached[static_cast<std::size_t>(o.back)];
+      a = b = static_cast<char>(a | b);
+    }
+  }
+  EXPECT_EQ(std::count(reached.begin(), reached.end(), 1), static_cast<long>(reached.size())) << scene.name;
+
+  for (const PlanRoom& room : plan.rooms) {
+    const auto& waypoints = scene.robots[0].waypoints;
+    EXPECT_TRUE(std::any_of(waypoints.begin(), waypoints.end(),
+                            [&](const Waypoint& w) { return room.contains(w.position.head<2>()); }))
+        << scene.name << ": " << room.kind;
+  }
+  const auto free = check_paths(scene, {});
+  EXPECT_TRUE(free) << free.error().message;
+}
+
+/// Things stand in their rooms and not in each other.
+void check_things(const Scene& scene) {
+  for (const PlanThing& thing : scene.plan->things) {
+    EXPECT_GT(signed_area(thing.outline), 0.0);
+    for (const Vector2d& p : thing.outline)
+      EXPECT_TRUE(scene.plan->rooms[static_cast<std::size_t>(thing.room)].contains(p)) << scene.name;
+    for (const PlanThing& other : scene.plan->things) {
+      Vector2d middle = Vector2d::Zero();
+      for (const Vector2d& p : other.outline) middle += 0.25 * p;
+      PlanRoom inside;
+      for (std::size_t i = 0; i < 4; ++i)
+        inside.faces.push_back({thing.outline[i], thing.outline[(i + 1) % 4], 0});
+      EXPECT_EQ(inside.contains(middle), &thing == &other) << scene.name << ": " << thing.type;
+    }
+  }
+}
+
+class SynthLayout : public testing::TestWithParam<const char*> {};
+
+TEST_P(SynthLayout, EveryNumberIsAWorldThatCanBeWalkedThrough) {
+  for (int number = 0; number < 40; ++number) {
+    const auto scene = make_layout(GetParam(), number, 1);
+    ASSERT_TRUE(scene) << scene.error().message;
+    check_rooms(*scene);
+    check_openings(*scene);
+    check_ways(*scene);
+    check_things(*scene);
+  }
+}
+
+TEST_P(SynthLayout, TheSameNumberIsTheSameWorldAndAnotherIsAnother) {
+  const auto first = make_layout(GetParam(), 3, 1), again = make_layout(GetParam(), 3, 2);
+  const auto other = make_layout(GetParam(), 4, 1);
+  ASSERT_TRUE(first && again && other);
+  const Scene& scene = *first;
+  ASSERT_EQ(again->faces.size(), scene.faces.size());
+  for (std::size_t i = 0; i < scene.faces.size(); ++i)
+    EXPECT_EQ(again->faces[i].origin, scene.faces[i].origin);
+  ASSERT_EQ(again->robots.size(), 2U);
+  ASSERT_EQ(again->robots[0].waypoints.size(), scene.robots[0].waypoints.size());
+  EXPECT_EQ(again->robots[0].waypoints.back().position, scene.robots[0].waypoints.back().position);
+  EXPECT_NE(again->robots[1].waypoints[1].position, scene.robots[0].waypoints[1].position);
+  EXPECT_NE(other->faces.size(), scene.faces.size());
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, SynthLayout, testing::Values("home", "office", "corridor"));
+
+TEST(SynthLayoutNumbers, WorldsDiffer) {
+  int tilted = 0, walls = 0, many_corners = 0;
+  for (int number = 0; number < 40; ++number) {
+    const auto scene = make_layout("home", number, 1);
+    ASSERT_TRUE(scene);
+    for (const PlanWall& wall : scene->plan->walls) {
+      tilted += std::min(std::abs(wall.direction.x()), std::abs(wall.direction.y())) > 0.01 ? 1 : 0;
+      ++walls;
+    }
+    for (const PlanRoom& room : scene->plan->rooms) many_corners += room.faces.size() > 4 ? 1 : 0;
+  }
+  EXPECT_GT(tilted, 0);
+  EXPECT_LT(tilted, walls / 5);
+  EXPECT_GT(many_corners, 5);
+}
+
+TEST(SynthLayoutNumbers, SceneWithoutLayoutsIsRefused) {
+  SynthOptions options;
+  options.layout = 3;
+  const auto none = open_scene("room", options, std::string(PLUMBLINE_SOURCE_DIR) + "/pipelines/scenes");
+  ASSERT_FALSE(none);
+  EXPECT_NE(none.error().message.find("home, office, corridor"), std::string::npos) << none.error().message;
+  const auto home = open_scene("home", {}, std::string(PLUMBLINE_SOURCE_DIR) + "/pipelines/scenes");
+  ASSERT_FALSE(home);
+  EXPECT_NE(home.error().message.find("--layout"), std::string::npos) << home.error().message;
+}
+
+TEST(SynthLayoutNumbers, FramesAreTheSameForAnyNumberOfThreads) {
+  struct Silent : core::Log {
+    void write(core::LogLevel, const std::string&) override {}
+  } log;
+  std::vector<cv::Mat> pictures;
+  for (const int threads : {1, 2}) {
+    const auto source =
+        open_synth("synth:home?layout=1&frames=3&width=160&height=120", "", core::Executor(threads), log);
+    ASSERT_TRUE(source) << source.error().message;
+    const auto frame = (*source)->read(2);
+    ASSERT_TRUE(frame);
+    pictures.push_back(frame->color);
+    pictures.push_back(frame->depth);
+    EXPECT_GT(cv::countNonZero(frame->depth > 0.3F), 160 * 120 / 3);
+  }
+  EXPECT_EQ(cv::norm(pictures[0], pictures[2], cv::NORM_INF), 0.0);
+  EXPECT_EQ(cv::norm(pictures[1], pictures[3], cv::NORM_INF), 0.0);
+}
+
+}  // namespace
+}  // namespace plumbline::synth
