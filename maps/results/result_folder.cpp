@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "plumbline/cloud/io/ply.hpp"
+#include "plumbline/core/json.hpp"
 #include "plumbline/maps/output_folder.hpp"
 
 namespace plumbline::maps {
@@ -45,11 +45,11 @@ core::Result<ResultFolder> open_result(const std::filesystem::path& folder) {
 }
 
 cloud::CloudFrame frame_of_result(const ResultFolder& result) {
-  std::ifstream stream(result.summary(), std::ios::binary);
-  const auto summary = nlohmann::json::parse(stream, nullptr, false);
-  const nlohmann::json::json_pointer place("/frame/up");
-  if (!summary.is_object() || !summary.contains(place) || !summary.at(place).is_string()) return {};
-  return cloud::frame_with(summary.at(place) == "none" ? cloud::Up::kMinusY : cloud::Up::kZ);
+  const auto summary = core::read_json(result.summary());
+  const nlohmann::ordered_json::json_pointer place("/frame/up");
+  if (!summary || !summary->is_object() || !summary->contains(place) || !summary->at(place).is_string())
+    return {};
+  return cloud::frame_with(summary->at(place) == "none" ? cloud::Up::kMinusY : cloud::Up::kZ);
 }
 
 cloud::CloudFrame frame_of_cloud(const std::filesystem::path& file, const cloud::CloudFrame& said) {

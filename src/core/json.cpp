@@ -9,6 +9,8 @@
 #include <sstream>
 #include <vector>
 
+#include "plumbline/core/git_lfs.hpp"
+
 namespace plumbline::core {
 namespace {
 
@@ -97,6 +99,7 @@ Result<Json> read_json(const std::filesystem::path& file) {
   std::string text(std::min<std::uintmax_t>(size, JsonLimits::kBytes) + 1, '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(stream.gcount()));
+  if (begins_as_lfs_pointer(text)) return input_error(fmt::format("{}: {}", file.string(), kLfsPointer));
   return parse_json(text, file.string());
 }
 
