@@ -9,7 +9,6 @@
 #include "option_flags.hpp"
 #include "plumbline/synth/layout.hpp"
 #include "plumbline/synth/recording.hpp"
-#include "plumbline/synth/scene.hpp"
 #include "terminal/print.hpp"
 #include "terminal/signals.hpp"
 

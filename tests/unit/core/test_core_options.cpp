@@ -195,18 +195,18 @@ TEST(Options, ForgottenGroupsAreSuggested) {
 }
 
 TEST(Options, SchemaOfEveryType) {
-  using Json = nlohmann::ordered_json;
   Sample s;
   const OptionTable table = s.table();
-  const Json schema = options_schema(table.specs());
+  const nlohmann::ordered_json schema = options_schema(table.specs());
   ASSERT_EQ(schema.size(), table.specs().size());
-  EXPECT_EQ(schema["lines"]["enum"], Json::parse(R"([true, false, "on", "off", "yes", "no"])"));
+  EXPECT_EQ(schema["lines"]["enum"],
+            nlohmann::ordered_json::parse(R"([true, false, "on", "off", "yes", "no"])"));
   EXPECT_EQ(schema["count"]["anyOf"][0],
-            Json::parse(R"({"type": "integer", "minimum": 50, "maximum": 10000})"));
-  EXPECT_EQ(schema["wait"]["anyOf"][0], Json::parse(R"({"type": "number", "minimum": 0})"));
+            nlohmann::ordered_json::parse(R"({"type": "integer", "minimum": 50, "maximum": 10000})"));
+  EXPECT_EQ(schema["wait"]["anyOf"][0], nlohmann::ordered_json::parse(R"({"type": "number", "minimum": 0})"));
   EXPECT_EQ(schema["leaf"]["anyOf"][1]["pattern"],
             "^[+-]?([0-9]+\\.?[0-9]*|\\.[0-9]+)([eE][+-]?[0-9]+)?( *(m|cm|mm|um))?$");
-  EXPECT_EQ(schema["kernel"]["enum"], Json::parse(R"(["huber", "none"])"));
+  EXPECT_EQ(schema["kernel"]["enum"], nlohmann::ordered_json::parse(R"(["huber", "none"])"));
   EXPECT_EQ(schema["box"]["minItems"], 2);
   EXPECT_EQ(schema["steps"]["anyOf"][1]["$ref"], "#/definitions/steps");
   EXPECT_EQ(schema["leaf"]["description"], "Leaf (0.001 m to 1 m; default: 0.01 m)");
