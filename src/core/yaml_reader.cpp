@@ -6,6 +6,7 @@
 #include <yaml-cpp/parser.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <fstream>
 #include <map>
 #include <sstream>
@@ -13,6 +14,7 @@
 
 #include "plumbline/core/config.hpp"
 #include "plumbline/core/git_lfs.hpp"
+#include "plumbline/core/shortage.hpp"
 
 namespace plumbline::core {
 namespace {
@@ -291,7 +293,12 @@ std::optional<ConfigNode> read_yaml(const std::filesystem::path& file, ConfigPro
     return unreadable(file, "is a folder, not a YAML file", problems);
   }
   std::ifstream stream(file, std::ios::binary);
-  if (!stream) return unreadable(file, "cannot be read; check its permissions", problems);
+  if (!stream) {
+    // Not a fault of the configuration, so it ends the command as missing memory does.
+    if (!shortage_of(errno).empty()) throw std::system_error(errno, std::generic_category(), file.string());
+    return unreadable(file, "cannot be read; check its permissions", problems);
+  }
+
   // Reading one byte more than allowed shows that it is too large; the file may be a device without end.
   std::string text(kMaxBytes + 1, '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));

@@ -22,8 +22,8 @@ class OutputFolderOfARun : public ProgramTest {
   /// Runs the program, and `commands` beside it as soon as `file` is there.
   [[nodiscard]] Outcome run_beside(const std::string& arguments, const std::string& file,
                                    const std::string& commands) const {
-    return run(arguments,
-               "(while [ ! -e '" + file + "' ]; do sleep 0.01; done; " + commands + ") >beside.txt 2>&1 & ");
+    return run(arguments, "{ (while [ ! -e '" + file + "' ]; do sleep 0.01; done; " + commands +
+                              ") >beside.txt 2>&1 & } && ");
   }
 };
 

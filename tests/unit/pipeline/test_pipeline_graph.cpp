@@ -56,7 +56,8 @@ TEST_F(GraphFile, IsSortedWhateverTheOrderInTheFile) {
 
 TEST_F(GraphFile, NothingAfterTheEqualsSignIsTheEmptyText) {
   EXPECT_EQ(refusal(kGood, {"twice.file="}), "accepted");
-  EXPECT_EQ(refusal(kGood, {"twice.by="}), "--set twice.by: '' is not a number");
+  EXPECT_EQ(refusal(kGood, {"twice.by="}),
+            "--set twice.by: is empty; give a value or leave it out (allowed: -9 to 9)");
 }
 
 TEST_F(GraphFile, EffectiveConfigurationReadsBackTheSame) {

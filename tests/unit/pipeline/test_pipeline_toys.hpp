@@ -58,7 +58,7 @@ class Scale : public Stage {
     table.integer("throw_at", throw_at_, {-1, 100000}, "", "Number to throw at");
     table.boolean("drop_odd", drop_odd_, "Give nothing for odd numbers");
     table.boolean("late", late_, "The earlier the later");
-    table.text("file", file_, "A file that must exist");
+    table.text("file", file_, "A file that must exist; empty: none", core::EmptyValue::kAllowed);
   }
   void check(const CheckContext& context, const core::ConfigMark& mark, const std::string& path,
              core::ConfigProblems& problems) override {
@@ -109,7 +109,7 @@ class Collect : public Stage {
  public:
   explicit Collect(Bench& bench) : bench_(bench) {}
   void declare(core::OptionTable& table) override {
-    table.text("writes", writes_, "A file it says to write");
+    table.text("writes", writes_, "A file it says to write; empty: none", core::EmptyValue::kAllowed);
   }
   [[nodiscard]] std::vector<std::string> files() const override { return {writes_}; }
   core::Result<void> process(StageIo& /*io*/) override { throw std::logic_error("has no frames"); }
@@ -128,7 +128,9 @@ class Collect : public Stage {
 class ToyTap : public Stage {
  public:
   explicit ToyTap(Bench& bench) : bench_(bench) {}
-  void declare(core::OptionTable& table) override { table.text("file", file_, "A file it says to write"); }
+  void declare(core::OptionTable& table) override {
+    table.text("file", file_, "A file it says to write; empty: none", core::EmptyValue::kAllowed);
+  }
   [[nodiscard]] std::vector<std::string> files() const override { return {file_}; }
   core::Result<void> process(StageIo& io) override {
     bench_.tapped += *io.input<int>("in");
