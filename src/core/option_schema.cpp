@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "empty_value.hpp"
 #include "units.hpp"
 
 namespace plumbline::core {
@@ -67,12 +68,14 @@ Json type_schema(const OptionSpec& spec) {
     case OptionType::kInteger:
     case OptionType::kNumber:
       return number_schema(spec);
+
     case OptionType::kText: {
       // an unquoted 12 is a text here, but not to JSON
       Json text = {{"type", Json::array({"string", "number", "boolean"})}};
-      if (spec.empty == EmptyValue::kRefused) text["minLength"] = 1;
+      if (!takes_empty(spec)) text["minLength"] = 1;
       return text;
     }
+
     case OptionType::kChoice:
       return {{"enum", words(spec.choices)}};
     case OptionType::kNumbers:

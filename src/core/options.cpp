@@ -9,6 +9,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "empty_value.hpp"
 #include "plumbline/core/option_schema.hpp"
 #include "units.hpp"
 
@@ -180,7 +181,8 @@ void OptionTable::set(const std::string& key, const ConfigNode& value, const std
   const std::string full_path = joined_path(path, key);
   for (std::size_t i = 0; i < specs_.size(); ++i) {
     if (specs_[i].key != key) continue;
-    if (specs_[i].empty == EmptyValue::kRefused && value.kind == Kind::kScalar && value.scalar.empty()) {
+
+    if (value.kind == Kind::kScalar && value.scalar.empty() && !takes_empty(specs_[i])) {
       problems.push_back(
           {value.mark, full_path,
            fmt::format("is empty; give a value or leave it out (allowed: {})", allowed_text(specs_[i]))});
@@ -194,6 +196,7 @@ void OptionTable::set(const std::string& key, const ConfigNode& value, const std
     if (!wrong.empty()) problems.push_back({value.mark, full_path, std::move(wrong)});
     return;
   }
+
   std::vector<std::string> keys;
   for (const OptionSpec& spec : specs_) keys.push_back(spec.key);
   problems.push_back({value.mark, full_path, "unknown key" + hint(key, keys)});

@@ -387,8 +387,7 @@ class Results(Folder):
         for name, told in (('a, "b"', 'a, "b"'), ("=1+1", "=1+1"), ("two\nlines", "two\\nlines"), (b"caf\xe9", "caf\ufffd")):
             folder = Path(os.fsdecode(os.fsencode(self.work) + b"/" + os.fsencode(name)))
             shutil.copytree(self.recording, folder)
-            result = plumbline.map(folder, self.work / "named", pipeline="known_poses", end=0.4, force=True,
-                                   output={"views": ""})
+            result = plumbline.map(folder, self.work / "named", end=0.4, force=True, **{"output.views": ""})
             self.assertEqual(set(result.keyframes.robots), {told})
             self.assertEqual(result.summary["input"], told)
 

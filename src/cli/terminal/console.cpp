@@ -72,8 +72,11 @@ void Console::write(core::LogLevel level, const std::string& message) {
 void Console::problems(const core::Error& error) {
   const std::lock_guard<std::mutex> lock(mutex_);
   clear_bar();
-  const auto ends = std::count(error.message.begin(), error.message.end(), '\n');
-  put(fmt::format("plumbline: error: {} problems\n{}\n", ends + 1,
+
+  std::size_t problems = 1;
+  for (std::size_t i = 1; i < error.message.size(); ++i)
+    problems += error.message[i - 1] == '\n' && error.message[i] != ' ' ? 1 : 0;
+  put(fmt::format("plumbline: error: {}{}\n", problems > 1 ? fmt::format("{} problems\n", problems) : "",
                   core::printable(error.message, core::Lines::kKept)));
 }
 

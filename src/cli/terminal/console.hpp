@@ -27,7 +27,8 @@ class Console : public core::Log {
 
   void write(core::LogLevel level, const std::string& message) override;
 
-  /// Several problems on separate lines, so that an editor can follow file:line:column.
+  /// Several problems on separate lines, so that an editor can follow file:line:column. Lines that are
+  /// indented belong to the one above.
   void problems(const core::Error& error);
   /// Shows a bar with rate and time left on a terminal, a line every few seconds elsewhere, or one object per
   /// second as JSON; nothing when quiet. `total` 0: not known.

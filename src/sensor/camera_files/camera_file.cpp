@@ -12,6 +12,7 @@
 
 #include "camera_files/camera_formats.hpp"
 #include "plumbline/core/git_lfs.hpp"
+#include "plumbline/core/text.hpp"
 
 namespace plumbline::sensor {
 namespace {
@@ -108,8 +109,10 @@ core::Error unknown_kind(const CameraText& text) {
       other.empty()
           ? fmt::format("is not a known camera file (known are camera.yaml and those of {})", programs)
           : fmt::format("is a camera file of {}, which is not read", other);
-  return {core::ErrorKind::kUsage, fmt::format("{}: {}; write a camera.yaml with these lines:\n{}", text.file,
-                                               what, camera_lines({}))};
+  return {core::ErrorKind::kUsage,
+          fmt::format("{}; write a camera.yaml with these lines:\n{}",
+                      core::printable(text.file + ": " + what), camera_lines({})),
+          true};
 }
 
 const CameraFormat* format_of(const CameraText& text) {

@@ -53,9 +53,12 @@ tl::unexpected<core::Error> refuse_camera(const CameraText& text, const CameraFo
                                           const core::ConfigMark& mark, const std::string& what,
                                           const Camera& known) {
   const std::string place = mark.line > 0 ? fmt::format(":{}:{}", mark.line, mark.column) : "";
-  return core::usage_error(
-      fmt::format("{}{}: camera file of {}: {}; write a camera.yaml with these lines:\n{}", text.file, place,
-                  format.program, what, camera_lines(known)));
+  const std::string problem =
+      fmt::format("{}{}: camera file of {}: {}", text.file, place, format.program, what);
+  return tl::unexpected<core::Error>({core::ErrorKind::kUsage,
+                                      fmt::format("{}; write a camera.yaml with these lines:\n{}",
+                                                  core::printable(problem), camera_lines(known)),
+                                      true});
 }
 
 const ConfigNode* find_any(const ConfigNode& map, const std::vector<std::string>& names) {

@@ -53,6 +53,22 @@ TEST_F(BadInput, OneTruncatedPictureIsSkipped) {
   EXPECT_NE(slurp(path("out/frames.csv")).find("\n5,unreadable,"), std::string::npos);
 }
 
+TEST_F(BadInput, LibrariesSayNothingOfTheirOwn) {
+  write_wall(path("wall"));
+  const cv::Mat picture = cv::imread(path("wall/rgb/005.png").string());
+  fs::remove(path("wall/rgb/005.png"));
+  cv::imwrite(path("wall/rgb/005.bmp").string(), picture);
+  truncate("wall/rgb/005.bmp");
+  std::string list = slurp(path("wall/rgb.txt"));
+  write("wall/rgb.txt", list.replace(list.find("005.png"), 7, "005.bmp"));
+
+  const Outcome o = run(std::string(kMap) + " -q");
+  EXPECT_EQ(o.code, 0) << o;
+  EXPECT_TRUE(o.told("wall/rgb/005.bmp: truncated or damaged")) << o;
+  std::istringstream lines(o.err);
+  for (std::string line; std::getline(lines, line);) EXPECT_EQ(line.rfind("plumbline: ", 0), 0U) << line;
+}
+
 TEST_F(BadInput, ManyBadFramesAreSummarisedAndNotTrusted) {
   WallRecording wall;
   wall.frames = 30;

@@ -160,7 +160,7 @@ TEST_F(Fuse, WorldsThatDoNotConnectStayApart) {
   EXPECT_FALSE(report.told("is not there")) << report;
   EXPECT_EQ(run("export both -o path.txt --what trajectory").code, 0);
   EXPECT_EQ(run("info both").code, 0);
-  EXPECT_EQ(run("evaluate trajectory both both/robots/" + name).code, 0);
+  EXPECT_EQ(run("evaluate trajectory both both/robots/" + name + "/trajectory.txt").code, 0);
 }
 
 TEST_F(Fuse, RobotsSideBySideMeetWhileTheyMap) {
