@@ -160,8 +160,8 @@ core::Result<void> check_links(const PairInfo& info, const StoredPair& pair) {
        {std::pair(&info.color_file, &pair.color), std::pair(&info.depth_file, &pair.depth)}) {
     if (!image->linked_out) continue;
     return core::input_error(
-        fmt::format("{}: a link leads there, out of the recording's folder; put the file itself there if it "
-                    "is to be copied",
+        fmt::format("{}: is behind a link that leads out of the recording's folder; put the file itself "
+                    "there if it is to be copied",
                     *file));
   }
   return {};

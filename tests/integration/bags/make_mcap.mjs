@@ -64,8 +64,9 @@ function* all() {
     yield [parent(base[message.what]) + "/camera_info", "sensor_msgs/msg/CameraInfo", message, {
       header: stamped, height: frames.height, width: frames.width, distortion_model: "plumb_bob", d: frames.d, k: frames.k,
       r: [1, 0, 0, 0, 1, 0, 0, 0, 1],
-      p: [frames.k[0], 0, frames.k[2], 0, 0, frames.k[4], frames.k[5], 0, 0, 0, 1, 0], binning_x: 0, binning_y: 0,
-      roi: { x_offset: 0, y_offset: 0, height: 0, width: 0, do_rectify: false },
+      p: [frames.k[0], 0, frames.k[2], 0, 0, frames.k[4], frames.k[5], 0, 0, 0, 1, 0],
+      binning_x: frames.binning ?? 0, binning_y: frames.binning ?? 0,
+      roi: { x_offset: 0, y_offset: 0, height: 0, width: 0, do_rectify: false, ...frames.roi },
     }];
   }
 }

@@ -13,7 +13,7 @@ from pathlib import Path
 import genpy
 import rosbag
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, RegionOfInterest
 from std_msgs.msg import Float32
 from tf2_msgs.msg import TFMessage
 
@@ -69,7 +69,9 @@ def main():
             info = CameraInfo(height=frames["height"], width=frames["width"],
                               distortion_model="Brown Conrady" if realsense else "plumb_bob", D=frames["d"],
                               K=frames["k"], R=[1, 0, 0, 0, 1, 0, 0, 0, 1],
-                              P=[frames["k"][0], 0, frames["k"][2], 0, 0, frames["k"][4], frames["k"][5], 0, 0, 0, 1, 0])
+                              P=[frames["k"][0], 0, frames["k"][2], 0, 0, frames["k"][4], frames["k"][5], 0, 0, 0, 1, 0],
+                              binning_x=frames.get("binning", 0), binning_y=frames.get("binning", 0),
+                              roi=RegionOfInterest(**frames.get("roi", {})))
             bag.write(info_topic, header_of(info, fields, frame[what]), when)
 
 

@@ -8,6 +8,7 @@ made of, read whatever their encoding, and survive what damaged files hold.
 PLUMBLINE_DATA has the recordings, PLUMBLINE_JUDGES node_modules with @mcap/core (scripts/install-deps --judges); without
 them, or Debian's python3-rosbag, python3-opencv, lz4 and zstd, the test is skipped (exit code 77).
 """
+import json
 import os
 import random
 import resource
@@ -159,6 +160,34 @@ def encodings(test):
     ways[0] = ways[0].rename(packed.with_name("packed.mcap.zstd"))
     for bag in ways:
         test.expect_same_images(frames / "folder", bag)
+    region(test)
+
+
+def region(test):
+    """CameraInfo of a larger picture, of which the images are a binned part: the camera is that of the images."""
+    frames = test.frames("region", "icl_nuim_of_kt0_a", 2, "rgb8", "16UC1")
+    said = json.loads((frames / "frames.json").read_text())
+    camera = camera_line(test.run("info", frames / "folder").stdout)
+    for binning in (1, 2):
+        x, y = 2 * 50, 2 * 30
+        full = dict(said)
+        fx, _, cx, _, fy, cy = said["k"][:6]
+        full["k"] = [fx * binning, 0, (cx + 0.5) * binning - 0.5 + x, 0, fy * binning,
+                     (cy + 0.5) * binning - 0.5 + y, 0, 0, 1]
+        full["roi"] = {"x_offset": x, "y_offset": y, "width": binning * said["width"], "height": binning * said["height"]}
+        full["width"], full["height"] = full["roi"]["width"] + x + 20, full["roi"]["height"] + y + 10
+        full["binning"] = binning
+        (frames / "frames.json").write_text(json.dumps(full))
+        for bag in (test.mcap(frames, f"region{binning}.mcap", "zstd"), test.rosbag(frames, f"region{binning}.bag", "none")):
+            told = camera_line(test.run("info", bag).stdout)
+            test.check(camera and told == camera, f"{bag.name}: the camera is {told}, not {camera}")
+            print(f"{bag.name}: camera {told}", flush=True)
+
+
+def camera_line(text):
+    """Size and pinhole of what `info` prints."""
+    return next((line.split(", ", 1)[1].split(", depth")[0] for line in text.splitlines()
+                 if line.startswith("camera: ")), "")
 
 
 def cut(test):

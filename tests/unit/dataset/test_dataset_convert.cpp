@@ -107,7 +107,7 @@ TEST_F(Convert, LinksOutOfTheFolderAreLeftOut) {
   replace_by_link("rgb/2.png", base_ / "secret.txt");
   replace_by_link("rgb/3.png", "../../other.png");
   replace_by_link("depth/4.png", "/etc/passwd");
-  expect_copies(folder_, 3, 3, "rgb/3.png: a link leads there, out of the recording's folder");
+  expect_copies(folder_, 3, 3, "rgb/3.png: is behind a link that leads out of the recording's folder");
   for (const auto& entry : fs::recursive_directory_iterator(base_ / "copy")) {
     if (!entry.is_regular_file()) continue;
     std::ifstream stream(entry.path(), std::ios::binary);
