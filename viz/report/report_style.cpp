@@ -30,7 +30,7 @@ p{margin:.5em 0;max-width:75em}
 .tiles{display:flex;flex-wrap:wrap;gap:.6em;margin:1em 0}
 .tiles div{flex:1 1 auto;white-space:nowrap;background:var(--soft);border:1px solid var(--rule);border-radius:8px;padding:.6em .85em}
 .tiles b{display:block;font-size:1.35em;line-height:1.25;font-variant-numeric:tabular-nums}
-.tiles span{color:var(--muted);font-size:.85em}
+.tiles span{color:var(--muted);font-size:.85em;white-space:normal}
 nav{display:flex;flex-wrap:wrap;gap:.2em 1.1em;margin:1.6em 0 0;font-size:.92em}
 a{color:var(--accent);text-decoration:none}
 a:hover{text-decoration:underline}
@@ -56,9 +56,9 @@ summary{cursor:pointer;color:var(--accent)}
 pre{background:var(--soft);border:1px solid var(--rule);border-radius:6px;padding:.8em 1em;overflow-x:auto;
 font:12.5px/1.45 ui-monospace,"DejaVu Sans Mono",Menlo,Consolas,monospace}
 footer{margin-top:3em;color:var(--muted);font-size:.85em;border-top:1px solid var(--rule);padding-top:.8em}
-@media(max-width:640px){.pictures{grid-template-columns:1fr}main{padding:1.2em .8em}}
+@media(max-width:640px){.facts th{white-space:normal}.pictures{grid-template-columns:1fr}main{padding:1.2em .8em}}
 @page{margin:14mm}
-@media print{.screen{display:none}.plans img{max-height:225mm}
+@media print{.screen,section:has(>.pv):not(:has(>.pv-paper)){display:none}.plans img{max-height:225mm}
 body{font-size:10.5pt}main{max-width:none;padding:0}nav{display:none}section{margin-top:1.4em}
 *{-webkit-print-color-adjust:exact;print-color-adjust:exact}h2,h3{break-after:avoid}
 figure,tr,.tiles,.verdict{break-inside:avoid}thead{display:table-header-group}.scroll{overflow:visible}

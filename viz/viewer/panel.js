@@ -89,18 +89,14 @@ class Panel {
     this.list = element('ol', { class: 'pv-list' });
     this.results = element('div', { class: 'pv-results', hidden: true }, this.list,
       this.button('Copy', 'Copy as text', () => this.copy(this.measuring.text(), 'measurements copied')));
-    this.placing = element('div', { class: 'pv-placing', hidden: !scene.placing },
-      scene.placing ? `${scene.placing}. X or More shows one, the other, or both.` : '');
     this.thumb = element('img', { class: 'pv-thumb', alt: 'picture of the keyframe', hidden: true });
     this.time = element('input', { type: 'range', min: 0, max: 1000, step: 1, value: 0, 'aria-label': 'Time along the path', oninput: () => this.goTo(this.time.value / 1000) });
     this.stamp = element('span');
     this.timeBar = element('div', { class: 'pv-time', hidden: !scene.paths.length }, this.button('▶', 'Fly (P)', () => this.fly()), this.time, this.stamp);
     this.dialog = element('dialog', { class: 'pv-help', 'aria-label': 'Keys' }, element('table', {}, ...kHelp.map(([keys, what]) =>
       element('tr', {}, element('th', {}, keys), element('td', {}, what)))), this.button('Close', '', () => this.dialog.close()));
-    this.root.append(this.bar, element('div', { class: 'pv-low' }, this.thumb, this.results, this.placing, this.told, this.legend, this.timeBar), this.dialog);
+    this.root.append(this.bar, element('div', { class: 'pv-low' }, this.thumb, this.results, scene.placing ? element('div', {}, `${scene.placing}. X shows the other, both.`) : '', this.told, this.legend, this.timeBar), this.dialog);
     this.mark();
-    this.paper = element('canvas', { class: 'pv-paper' });
-    this.root.append(this.paper);
     addEventListener('beforeprint', () => this.print());
     const thinned = scene.clouds.filter((c) => c.of > c.count).map((c) => `${c.count.toLocaleString('en')} of ${c.of.toLocaleString('en')} points`);
     if (thinned.length) this.say(`thinned: ${thinned.join(', ')}`);
@@ -402,30 +398,28 @@ class Panel {
     else if (layer.scale === 'view') bar('0 s', `${(view.times()[1] - view.times()[0]).toFixed(0)} s`);
     else if (layer.scale) bar(value(layer.low, layer.unit), value(layer.high, layer.unit));
     this.layers.value = layer.key;
-    if (layer.key === 'sigma') parts.push(element('span', {}, 'noise alone; the true error exceeds it'));
+    if (layer.key === 'sigma') parts.push(element('span', {}, 'noise alone, true errors are larger'));
     this.legend.replaceChildren(...(parts.length ? [element('em', {}, layer.label || layer.key), ...parts] : []));
   }
 
   // Saving, and links.
 
-  /** Copies what is shown into another canvas. */
-  copyTo(both) {
-    this.view.finish(Number(this.canvas.dataset.pointsDrawn));
-    [both.width, both.height] = [this.canvas.width, this.canvas.height];
-    const g = both.getContext('2d');
+  /** A copy of what is shown. */
+  copied() {
+    const { width, height, dataset } = this.canvas;
+    this.view.finish(Number(dataset.pointsDrawn));
+    const both = element('canvas', { width, height, class: 'pv-paper' }), g = both.getContext('2d');
     g.drawImage(this.canvas, 0, 0);
     g.drawImage(this.overlay, 0, 0);
     return both;
   }
-  picture() {
-    const both = this.copyTo(element('canvas'));
-    return new Promise((done) => both.toBlob(done, 'image/png'));
-  }
+  picture() { return new Promise((done) => this.copied().toBlob(done, 'image/png')); }
   /** Puts what is shown onto paper, where the view itself is not. */
   print() {
     if (this.view.dirty) this.view.quick(true);
-    this.root.classList.toggle('pv-printed', Number(this.canvas.dataset.pointsDrawn) > 0);
-    this.copyTo(this.paper);
+    if (this.paper) this.paper.remove();
+    this.paper = this.copied();
+    if (this.view.first) this.root.after(this.paper);
   }
   async savePicture() { saveAs(await this.picture(), `${this.scene.name}.png`); }
   savePoints() {

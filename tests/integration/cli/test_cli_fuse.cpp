@@ -106,8 +106,24 @@ TEST_F(Fuse, MapsWithoutCommonFramesAreShownTogether) {
       run("synth room -o world --frames 80 --fps 10 --width 320 --height 240 --reference-spacing 10cm -q")
           .code,
       0);
-  ASSERT_EQ(run("map world/robot0 -o a --every 2" + std::string(kLean)).code, 0);
-  ASSERT_EQ(run("map world/robot0 -o b --from 0.1 --every 2" + std::string(kLean)).code, 0);
+  ASSERT_EQ(run("map world/robot0 -o a --to 5.5" + std::string(kLean)).code, 0);
+
+  // The same room on another day, from the third second on.
+  fs::create_directory(path("later"));
+  for (const char* part : {"rgb", "depth"})
+    fs::create_directory_symlink(path("world/robot0") / part, path("later") / part);
+  fs::copy(path("world/robot0/camera.yaml"), path("later/camera.yaml"));
+  for (const char* list : {"rgb.txt", "depth.txt"}) {
+    std::istringstream all(slurp(path("world/robot0") / list));
+    std::ofstream later(path("later") / list);
+    int frame = 0;
+    for (std::string line; std::getline(all, line);) {
+      if (line.front() == '#' || frame++ < 20) continue;
+      const std::size_t blank = line.find(' ');
+      later << std::to_string(std::stod(line.substr(0, blank)) + 1e5) << line.substr(blank) << "\n";
+    }
+  }
+  ASSERT_EQ(run("map later -o b" + std::string(kLean)).code, 0);
 
   const Outcome shown = run("report a b -o ab.html");
   ASSERT_EQ(shown.code, 0) << shown;

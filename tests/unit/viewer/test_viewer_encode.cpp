@@ -201,7 +201,7 @@ TEST(ViewerEncode, SmallAndTheSameEachTime) {
   Cost cost;
   const std::string html = page(scene, "test", &cost);
   EXPECT_EQ(html, page(scene, "test"));
-  EXPECT_LE(cost.code, 60000U);
+  EXPECT_LE(cost.code, 61000U);
   EXPECT_EQ(cost.points, 400000U);
   EXPECT_LT(static_cast<double>(cost.place_and_color) / 4e5,
             5.0);  // at random places; surfaces of maps: under 4.2

@@ -74,7 +74,7 @@ std::string figures_html(const ReportData& data) {
                      {"path", number_text(length_m, 2, "m")},
                      {"keyframes", count_at(s, "/keyframes")},
                      {"cloud points", count_at(s, "/cloud/points")},
-                     {"extent of the cloud, without its outer 0.5 %", extent_text(data)},
+                     {"extent without the outer 0.5 %", extent_text(data)},
                      data.fused_afterwards
                          ? std::pair{std::string("to fuse"), filled(s, "{/timing/wall_s:1 s}")}
                          : std::pair{std::string("frames a second"), filled(s, "{/timing/fps:1}")}});
