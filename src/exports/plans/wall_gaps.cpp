@@ -5,12 +5,12 @@
 #include <utility>
 
 #include "plans/wall_steps.hpp"
+#include "plumbline/core/numbers.hpp"
 
 namespace plumbline::exports {
 namespace {
 
 constexpr double kHalfBand_m = 0.1;  ///< of the heights that count as at the cut
-constexpr double kMostSurface = 0.25;
 
 /// Mean over the columns around one, which evens out where rays are sparse.
 template <typename Share>
@@ -23,47 +23,62 @@ double mean_around(const WallRaster& raster, int column, const Share& share) {
   return sum / (last - first + 1);
 }
 
+bool is_bare(const WallRaster& raster, int column, const Cut& cut) {
+  constexpr double kMostSurface = 0.25;
+  return raster.seen(column, cut.at_m - kHalfBand_m, cut.at_m + kHalfBand_m) <= kMostSurface;
+}
+
 /// True if a column has no surface at the cut, and cameras looked through it there.
 bool is_crossed(const WallRaster& raster, int column, const Cut& cut) {
   constexpr double kLeastCrossed = 0.15;
+  if (!is_bare(raster, column, cut)) return false;
   const double low = cut.at_m - kHalfBand_m;
   const double high = cut.at_m + kHalfBand_m;
-  if (raster.seen(column, low, high) > kMostSurface) return false;
   const double crossed = mean_around(raster, column, [&](int c) { return raster.crossed(c, low, high); });
   const double hidden = mean_around(raster, column, [&](int c) { return raster.hidden(c, low, high); });
   return crossed >= kLeastCrossed && crossed > hidden;
 }
 
-/// True if a column has no surface at the cut, but above and below it: a pane, or something dark.
-bool is_pane(const WallRaster& raster, int column, const Cut& cut) {
-  constexpr double kFoot_m = 0.1;
-  const double low = cut.at_m - kHalfBand_m;
-  const double high = cut.at_m + kHalfBand_m;
-  if (low <= kFoot_m || raster.seen(column, low, high) > kMostSurface) return false;
-  return raster.seen(column, kFoot_m, low) > 0.0 && raster.seen(column, high, kHighest_m) > 0.0;
+/// Height of the wall below the cut, over the floor; 0: nothing of it was seen.
+double sill_of(const WallRaster& raster, int column, const Cut& cut) {
+  return raster.top(column, cut.at_m - kHalfBand_m);
 }
 
-/// True if cameras looked through the columns, or nothing in front hid the wall there.
-bool is_gap(const WallRaster& raster, int first, int last, const Cut& cut) {
-  constexpr double kLeastCrossed = 0.5;  // share of the columns
-  constexpr double kMostHidden = 0.05;   // the frame of a screen before the wall hides more
-  constexpr double kAround_m = 0.3;
-  double crossed = 0.0, hidden = 0.0;
+/// True if columns without surface at the cut are a window: a hole over a level sill, which nothing that
+/// stands at the wall hides. Where cameras did not look as high as the cut, wall is seen up to little below.
+bool is_window(const WallRaster& raster, int first, int last, const Cut& cut) {
+  constexpr double kLeastDrop_m = 0.25;
+  constexpr double kLevel_m = 0.06;
+  constexpr double kLeastLevel = 0.8;
+  constexpr double kMostHidden = 0.1;
+  std::vector<double> sills;
+  double hidden = 0.0;
   for (int c = first; c <= last; ++c) {
-    crossed += is_crossed(raster, c, cut) ? 1.0 : 0.0;
-    hidden += raster.hidden(c, std::max(0.0, cut.at_m - kAround_m), cut.at_m + kAround_m);
+    sills.push_back(sill_of(raster, c, cut));
+    hidden += raster.hidden(c, cut.at_m - kHalfBand_m, cut.at_m + kHalfBand_m);
   }
-  return crossed >= kLeastCrossed * (last - first + 1) || hidden <= kMostHidden * (last - first + 1);
+
+  const double sill = core::median(sills);
+  const auto level = std::count_if(sills.begin(), sills.end(),
+                                   [&](double height) { return std::abs(height - sill) < kLevel_m; });
+  const auto columns = static_cast<double>(sills.size());
+  return sill <= cut.at_m - kLeastDrop_m && static_cast<double>(level) >= kLeastLevel * columns &&
+         hidden <= kMostHidden * columns;
 }
 
 }  // namespace
 
 std::vector<WallOpening> gaps_between(const WallRaster& raster, double s0, double s1, const Cut& cut) {
   constexpr int kBridge = 5;  // columns with the bars of a window
+  constexpr int kBeside = 3;  // columns of wall on both sides of a window
   constexpr double kNarrowest_m = 0.3;
+  constexpr double kLowestSill_m = 0.25;
+  const int begin = raster.column_of(s0);
+  const int end = raster.column_of(s1);
   std::vector<std::pair<int, int>> runs;
-  for (int c = raster.column_of(s0); c <= raster.column_of(s1); ++c) {
-    if (!is_crossed(raster, c, cut) && !is_pane(raster, c, cut)) continue;
+  for (int c = begin; c <= end; ++c) {
+    const bool over_sill = is_bare(raster, c, cut) && sill_of(raster, c, cut) > kLowestSill_m;
+    if (!over_sill && !is_crossed(raster, c, cut)) continue;
     if (!runs.empty() && c - runs.back().second <= kBridge) {
       runs.back().second = c;
     } else {
@@ -74,7 +89,12 @@ std::vector<WallOpening> gaps_between(const WallRaster& raster, double s0, doubl
   std::vector<WallOpening> gaps;
   for (const auto& [a, b] : runs) {
     const WallOpening gap{std::max(s0, raster.start_of(a)), std::min(s1, raster.start_of(b + 1))};
-    if (gap.s1 - gap.s0 >= kNarrowest_m && is_gap(raster, a, b, cut)) gaps.push_back(gap);
+    if (gap.s1 - gap.s0 < kNarrowest_m) continue;
+
+    int crossed = 0;
+    for (int c = a; c <= b; ++c) crossed += is_crossed(raster, c, cut) ? 1 : 0;
+    const bool beside = a >= begin + kBeside && b <= end - kBeside;
+    if (2 * crossed >= b - a + 1 || (beside && is_window(raster, a, b, cut))) gaps.push_back(gap);
   }
   return gaps;
 }

@@ -34,14 +34,15 @@ void WallRaster::add_surface(const Eigen::Vector3d& place) { mark(place, surface
 
 void WallRaster::add_rays(const ViewRays& rays) {
   constexpr double kBehind_m = 0.08;  // further than noise
-  constexpr double kBefore_m = 0.04;  // flat things on a wall are in front of it, and noise is not surface
+  constexpr double kBefore_m = 0.04;  // flat things on a wall are in front of it
+  constexpr double kAtWall_m = 0.4;   // things further from it hide a part from some places only
   const double origin = normal_.dot(rays.origin.head<2>()) - offset_m_;
   for (const Eigen::Vector3f& end_f : rays.ends) {
     const Eigen::Vector3d end = end_f.cast<double>();
     const double reached = normal_.dot(end.head<2>()) - offset_m_;
     const bool through =
         (origin > kBehind_m && reached < -kBehind_m) || (origin < -kBehind_m && reached > kBehind_m);
-    const bool before = reached > kBefore_m && origin > reached + kBefore_m;
+    const bool before = reached > kBefore_m && reached < kAtWall_m && origin > reached + kBefore_m;
     if (!through && !before) continue;
     mark(rays.origin + origin / (origin - reached) * (end - rays.origin), through ? rays_ : hidden_);
   }
@@ -57,8 +58,9 @@ double WallRaster::share(const std::vector<std::uint8_t>& cells, int column, dou
   return static_cast<double>(marked) / (high - low);
 }
 
-double WallRaster::top(int column) const {
-  for (int row = kRows - 1; row >= 0; --row) {
+double WallRaster::top(int column, double below_m) const {
+  const int rows = std::clamp(static_cast<int>(std::lround(below_m / kHeight_m)), 0, kRows);
+  for (int row = rows - 1; row >= 0; --row) {
     if (surface_[static_cast<std::size_t>(column) * kRows + static_cast<std::size_t>(row)] != 0)
       return (row + 1) * kHeight_m;
   }

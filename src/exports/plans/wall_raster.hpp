@@ -34,12 +34,12 @@ class WallRaster {
   [[nodiscard]] double crossed(int column, double low_m, double high_m) const {
     return share(rays_, column, low_m, high_m);
   }
-  /// Share of the cells that lie behind what rays from the front ended at.
+  /// Share of the cells behind something that stands at the wall, where rays from the front ended.
   [[nodiscard]] double hidden(int column, double low_m, double high_m) const {
     return share(hidden_, column, low_m, high_m);
   }
-  /// Height over the floor of the highest surface in a column; 0: none.
-  [[nodiscard]] double top(int column) const;
+  /// Height over the floor of the highest surface in a column, below a height; 0: none.
+  [[nodiscard]] double top(int column, double below_m = kRows * kHeight_m) const;
 
  private:
   void mark(const Eigen::Vector3d& place, std::vector<std::uint8_t>& cells) const;

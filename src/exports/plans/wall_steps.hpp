@@ -28,7 +28,6 @@ struct Fronts {
   std::shared_ptr<const WallRaster> first, last;
 };
 
-constexpr double kHighest_m = 3.0;  ///< of what is looked at of a wall, over the floor
 constexpr double kNarrowestDoor_m = 0.55;
 constexpr double kWidestDoor_m = 1.6;
 constexpr double kThickestWall_m = 0.45;
@@ -44,8 +43,8 @@ struct Cut {
 
 /// Drops sides that the cut passes over or below, and finds the gaps of the others.
 void cut_sides(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, const Cut& cut);
-/// Parts between two places of a side where the cut meets no wall: cameras looked through, or surface was
-/// seen above and below and nothing in front hid the part, as at a window whose pane reflects nothing.
+/// Parts between two places of a side where the cut meets no wall: cameras looked through, or it is a hole
+/// over a level sill, between wall, that nothing at the wall hides: a window whose pane reflects nothing.
 std::vector<WallOpening> gaps_between(const WallRaster& raster, double s0, double s1, const Cut& cut);
 /// Drops gaps that are doors.
 void drop_gaps_at_doors(WallLine& wall);
