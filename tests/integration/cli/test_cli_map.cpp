@@ -330,22 +330,24 @@ TEST_F(MapCommand, AGeneratedWorldIsARecordingToo) {
 }
 
 TEST_F(MapCommand, AStandardDeviationThatIsNotKnownIsNullAndSaysWhy) {
-  const Outcome o =
-      run(std::string("map 'synth:room?frames=4&width=320&height=240' -o out -q") + kNoPictures);
-  ASSERT_EQ(o.code, 0) << o;
-  const auto summary = read_json(path("out/summary.json"));
-  ASSERT_EQ(summary["keyframes"], 1);
-  for (const char* name : {"sigma_position_m", "sigma_rotation_rad"}) {
-    EXPECT_TRUE(summary["refine"][name]["median"].is_null()) << summary["refine"];
-    EXPECT_TRUE(summary["refine"][name]["p90"].is_null()) << summary["refine"];
+  const std::vector<std::pair<std::string, std::string>> runs{
+      {"frames=4&width=320&height=240'", "the map has fewer than two keyframes"},
+      {"frames=40&width=320&height=240' --set refine.accuracy=off", "refine.accuracy is off"}};
+  for (const auto& [world, why] : runs) {
+    const Outcome o = run("map 'synth:room?" + world + " -o out --force -q" + kNoPictures);
+    ASSERT_EQ(o.code, 0) << o;
+    const auto summary = read_json(path("out/summary.json"));
+    for (const char* name : {"sigma_position_m", "sigma_rotation_rad"}) {
+      EXPECT_TRUE(summary["refine"][name]["median"].is_null()) << summary["refine"];
+      EXPECT_TRUE(summary["refine"][name]["p90"].is_null()) << summary["refine"];
+    }
+    EXPECT_EQ(summary["refine"]["sigma_note"], why);
+    EXPECT_TRUE(summary["cloud"]["sigma_m"]["median"].is_null()) << summary["cloud"];
   }
-  EXPECT_EQ(summary["refine"]["sigma_note"], "the map has fewer than two keyframes");
-  EXPECT_TRUE(summary["cloud"]["sigma_m"]["median"].is_null()) << summary["cloud"];
 
   const Outcome page = run("report out -o page.html");
   ASSERT_EQ(page.code, 0) << page;
-  EXPECT_NE(slurp(path("page.html")).find("not known: the map has fewer than two keyframes"),
-            std::string::npos);
+  EXPECT_NE(slurp(path("page.html")).find("not known: refine.accuracy is off"), std::string::npos);
   const Outcome drawn = run("render out -o sigma.png --color sigma");
   EXPECT_EQ(drawn.code, 2) << drawn;
   EXPECT_TRUE(drawn.told("sigma_note")) << drawn;
