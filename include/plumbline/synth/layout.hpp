@@ -9,9 +9,9 @@ namespace plumbline::synth {
 /// Kinds of worlds that a number chooses: "home", "office", "corridor".
 const std::vector<std::string>& layout_kinds();
 
-/// The world of a kind and number (from 0), with its plan and a path for each of `robots`. The same number
+/// The world of a kind and of the options' number, with its plan and a path for each robot. The same number
 /// gives the same world. Errors: kUsage (no such kind).
-core::Result<Scene> make_layout(const std::string& kind, int number, int robots);
+core::Result<Scene> make_layout(const std::string& kind, const SynthOptions& options);
 
 /// A scene file or, if the options have a layout, the world of that number.
 core::Result<Scene> open_scene(const std::string& name_or_file, const SynthOptions& options,

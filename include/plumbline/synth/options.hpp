@@ -12,13 +12,15 @@ namespace plumbline::synth {
 
 enum class Texture { kFull, kWeak, kNone };
 enum class Sensor { kIdeal, kKinect, kRealsense };
-enum class Motion { kScene, kHandheld, kWheeled };  ///< kScene: as the scene file says
+enum class Motion { kScene, kHandheld, kWheeled };                  ///< kScene: as the scene file says
+enum class Route { kScene, kTour, kLaps, kWander, kThereAndBack };  ///< kScene: as the file says, else a tour
 
 struct SynthOptions {
-  int frames = -1;  ///< per robot; -1: the path once; more than the path has: it starts again
-  int robots = 1;   ///< number of recordings
-  int layout = -1;  ///< number of a world that is made from it; -1: the scene as its file says
-  int walkers = 0;  ///< number of the scene's walkers to film; they are not in reference.ply
+  int frames = -1;             ///< per robot; -1: the path once; more than the path has: it starts again
+  int robots = 1;              ///< number of recordings
+  int layout = -1;             ///< number of a world that is made from it; -1: the scene as its file says
+  Route path = Route::kScene;  ///< through a world made from a number
+  int walkers = 0;             ///< number of the scene's walkers to film; they are not in reference.ply
   Texture texture = Texture::kFull;  ///< kNone: white cloth and grey floors, geometry unchanged
   Sensor sensor = Sensor::kKinect;   ///< kIdeal: no noise, no offset between stamps, no blur
   Motion motion = Motion::kScene;
@@ -60,5 +62,6 @@ core::Result<void> check(const SynthOptions& options);
 const char* to_string(Texture texture);
 const char* to_string(Sensor sensor);
 const char* to_string(Motion motion);
+const char* to_string(Route route);
 
 }  // namespace plumbline::synth

@@ -145,6 +145,7 @@ bool Ground::try_block(const std::vector<Vector2d>& outline, bool hides_view,
 
   const cv::Mat1b before = free_(part).clone();
   fill(free_, outline, 0);
+
   cv::Mat1b inside(free_.size(), uchar{0});
   fill(inside, room, 1);
   cv::Mat1f distance;
@@ -177,6 +178,7 @@ std::vector<Vector2d> Ground::way(const Vector2d& from, const Vector2d& to) cons
 
   const cv::Point start = cell_of(from), goal = cell_of(to);
   if (!walkable(start) || !walkable(goal)) return {};
+
   const int columns = free_.cols;
   cv::Mat1f cost(free_.size(), 1e9F);
   cv::Mat1i before(free_.size(), -1);
@@ -194,6 +196,7 @@ std::vector<Vector2d> Ground::way(const Vector2d& from, const Vector2d& to) cons
   while (!open.empty()) {
     const Entry top = open.top();
     open.pop();
+
     const cv::Point c(top.cell % columns, top.cell / columns);
     if (top.cost > cost(c)) continue;
     if (c == goal) break;

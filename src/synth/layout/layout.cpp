@@ -13,7 +13,8 @@ namespace plumbline::synth {
 namespace {
 
 /// One of the worlds that a number could become; nothing if its rooms cannot all be walked through.
-std::optional<Scene> try_layout(const std::string& kind, int number, int robots, int attempt) {
+std::optional<Scene> try_layout(const std::string& kind, const SynthOptions& options, int attempt) {
+  const int number = options.layout;
   const std::uint64_t seed = mix(static_cast<std::uint64_t>(number), static_cast<std::uint64_t>(attempt) + 1,
                                  static_cast<std::uint64_t>(kind[0]));
   Plan plan;
@@ -37,9 +38,9 @@ std::optional<Scene> try_layout(const std::string& kind, int number, int robots,
   scene.light_pitch = 0.12;
   for (Lamp& lamp : scene.lamps) lamp.reach = 6.0;
 
-  for (int robot = 0; robot < robots; ++robot) {
+  for (int robot = 0; robot < options.robots; ++robot) {
     Rng walk(seed, 16 + static_cast<std::uint64_t>(robot));
-    scene.robots.push_back(plan_tour(plan, ground, robot, walk));
+    scene.robots.push_back(plan_path(plan, ground, options.path, robot, walk));
     if (scene.robots.back().waypoints.empty()) return std::nullopt;
   }
   scene.plan = std::move(plan);
@@ -49,11 +50,11 @@ std::optional<Scene> try_layout(const std::string& kind, int number, int robots,
 }  // namespace
 
 const std::vector<std::string>& layout_kinds() {
-  static const std::vector<std::string> kKinds = {"home", "office", "corridor"};
-  return kKinds;
+  static const std::vector<std::string> kLayoutKinds = {"home", "office", "corridor"};
+  return kLayoutKinds;
 }
 
-core::Result<Scene> make_layout(const std::string& kind, int number, int robots) {
+core::Result<Scene> make_layout(const std::string& kind, const SynthOptions& options) {
   const auto& kinds = layout_kinds();
   if (std::find(kinds.begin(), kinds.end(), kind) == kinds.end()) {
     return core::usage_error(
@@ -61,17 +62,22 @@ core::Result<Scene> make_layout(const std::string& kind, int number, int robots)
   }
   constexpr int kAttempts = 200;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    if (auto scene = try_layout(kind, number, robots, attempt)) return std::move(*scene);
+    if (auto scene = try_layout(kind, options, attempt)) return std::move(*scene);
   }
   return core::usage_error(
-      fmt::format("layout: no {} could be made from the number {}; take another one", kind, number));
+      fmt::format("layout: no {} could be made from the number {}; take another one", kind, options.layout));
 }
 
 core::Result<Scene> open_scene(const std::string& name_or_file, const SynthOptions& options,
                                const std::filesystem::path& scenes_folder) {
-  if (options.layout >= 0) return make_layout(name_or_file, options.layout, options.robots);
+  if (options.layout >= 0) return make_layout(name_or_file, options);
   if (name_or_file == "home") {
     return core::usage_error("home is made from a number: give --layout N, in an address layout=N");
+  }
+  if (options.path != Route::kScene) {
+    return core::usage_error(
+        fmt::format("path: '{}' is for worlds made from a number (layout); the paths of {} are in its file",
+                    to_string(options.path), name_or_file));
   }
   return load_scene(name_or_file, scenes_folder);
 }

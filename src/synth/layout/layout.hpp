@@ -26,8 +26,8 @@ void build_shell(const Plan& plan, Rng& rng, Builder& builder);
 /// Furniture and columns; whatever would stand in the way of people is left out.
 void furnish(Plan& plan, Ground& ground, Rng& rng, Builder& builder);
 
-/// The camera's path through all rooms and back; empty if one of them cannot be reached.
-RobotPath plan_tour(const Plan& plan, const Ground& ground, int robot, Rng& rng);
+/// The camera's path, which ends where it began; empty if it finds none.
+RobotPath plan_path(const Plan& plan, const Ground& ground, Route route, int robot, Rng& rng);
 
 /// Frame of a face: origin at its right end seen from the room, x to its left end, y into the wall, z up.
 geometry::Rigid3 face_frame(const PlanFace& face);

@@ -156,6 +156,7 @@ class Shell {
       piece(x, part.x0, 0.0, height);
       piece(part.x0, part.x1, 0.0, part.opening->sill);
       piece(part.x0, part.x1, part.opening->head, height);
+
       if (part.opening->kind == OpeningKind::kDoor || part.opening->kind == OpeningKind::kWindow)
         add_casing(f, part);
       x = part.x1;

@@ -134,6 +134,7 @@ bool Subdivision::merge(int into, int from) {
     merged.points.push_back(at);
     merged.walls.push_back(after.at(at).second);
   }
+
   if (merged.points.size() != after.size()) return false;
   a = std::move(merged);
   b = {};

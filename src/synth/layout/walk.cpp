@@ -208,28 +208,74 @@ bool keeps_clear(const RobotPath& path, const Ground& ground) {
   return true;
 }
 
-RobotPath try_tour(const Plan& plan, const Ground& ground, int robot, Rng& rng) {
+/// One place of each corridor or, where these are few, of the first rooms, in the order around their middle.
+std::vector<std::vector<Vector2d>> lap(const Plan& plan, const std::vector<int>& order,
+                                       const std::vector<std::vector<Vector2d>>& rooms) {
+  std::vector<Vector2d> corridors, first, all;
+  for (const int room : order) {
+    const bool corridor = plan.rooms[static_cast<std::size_t>(room)].kind == "corridor";
+    const Vector2d& place = rooms[static_cast<std::size_t>(room)].front();
+    if (corridor) corridors.push_back(place);
+    if (first.size() < 4) first.push_back(place);
+  }
+
+  all = corridors.size() > 2 ? corridors : first;
+  Vector2d middle = Vector2d::Zero();
+  for (const Vector2d& p : all) middle += p / static_cast<double>(all.size());
+  std::sort(all.begin(), all.end(),
+            [&](const Vector2d& a, const Vector2d& b) { return heading(a - middle) < heading(b - middle); });
+
+  std::vector<std::vector<Vector2d>> out;
+  for (const Vector2d& p : all) out.push_back({p});
+  return out;
+}
+
+/// Places to go to, group after group, in any order within one; empty if a room has none.
+std::vector<std::vector<Vector2d>> destinations(const Plan& plan, const Ground& ground, Route route,
+                                                Rng& rng) {
+  std::vector<int> order;
+  std::vector<char> seen(plan.rooms.size(), 0);
+  visit(plan, rng.integer(0, static_cast<int>(plan.rooms.size()) - 1), rng, seen, order);
+  const auto door = std::find_if(plan.openings.begin(), plan.openings.end(),
+                                 [](const PlanOpening& o) { return o.passable(); });
+  if (door == plan.openings.end()) return {};
+
+  const cv::Mat1b reachable = ground.reachable(plan.middle(*door));
+  std::vector<std::vector<Vector2d>> rooms, out;
+  for (const PlanRoom& room : plan.rooms) {
+    rooms.push_back(stations(room, ground, reachable));
+    if (rooms.back().empty()) return {};
+  }
+
+  const auto& start = rooms[static_cast<std::size_t>(order.front())];
+  if (route == Route::kLaps) return lap(plan, order, rooms);
+  if (route == Route::kThereAndBack) {
+    Vector2d far = start.front();
+    for (const auto& places : rooms) {
+      if ((places.front() - start.front()).norm() > (far - start.front()).norm()) far = places.front();
+    }
+    return {{start.front()}, {far}};
+  }
+
+  if (route == Route::kWander) {
+    for (int i = 0; i < 24; ++i) out.push_back({rng.pick(rng.pick(rooms))});
+  } else {
+    for (const int room : order) out.push_back(rooms[static_cast<std::size_t>(room)]);
+  }
+  return out;
+}
+
+RobotPath try_path(const Plan& plan, const Ground& ground, Route route, int robot, Rng& rng) {
   RobotPath path;
   path.name = fmt::format("robot{}", robot);
   path.speed = rng.uniform(0.55, 0.8);
   path.turn_rate = 0.8;
 
-  std::vector<int> order;
-  std::vector<char> seen(plan.rooms.size(), 0);
-  visit(plan, rng.integer(0, static_cast<int>(plan.rooms.size()) - 1), rng, seen, order);
-
-  const auto door = std::find_if(plan.openings.begin(), plan.openings.end(),
-                                 [](const PlanOpening& o) { return o.passable(); });
-  if (door == plan.openings.end()) return path;
-  const cv::Mat1b reachable = ground.reachable(plan.middle(*door));
-
   std::vector<Vector2d> way;
-  for (const int room : order) {
-    std::vector<Vector2d> places = stations(plan.rooms[static_cast<std::size_t>(room)], ground, reachable);
-    if (places.empty()) return path;
+  for (std::vector<Vector2d>& places : destinations(plan, ground, route, rng)) {
+    if (way.empty()) way = {places.back()};
 
     while (!places.empty()) {
-      if (way.empty()) way = {places.back()};
       const auto nearest =
           std::min_element(places.begin(), places.end(), [&](const Vector2d& a, const Vector2d& b) {
             return (a - way.back()).norm() < (b - way.back()).norm();
@@ -242,10 +288,12 @@ RobotPath try_tour(const Plan& plan, const Ground& ground, int robot, Rng& rng) 
       places.erase(nearest);
     }
   }
+  if (way.empty()) return path;
 
   const std::vector<Vector2d> back = straighten(ground.way(way.back(), way.front()), ground);
   way.insert(way.end(), back.begin(), back.end());
   const std::vector<Vector2d> line = round_off(way, ground);
+  if (line.size() < 4) return path;
 
   path.closed = true;
   path.waypoints = film(plan, line, ground, rng);
@@ -254,9 +302,9 @@ RobotPath try_tour(const Plan& plan, const Ground& ground, int robot, Rng& rng) 
 
 }  // namespace
 
-RobotPath plan_tour(const Plan& plan, const Ground& ground, int robot, Rng& rng) {
+RobotPath plan_path(const Plan& plan, const Ground& ground, Route route, int robot, Rng& rng) {
   for (int tries = 0; tries < 6; ++tries) {
-    RobotPath path = try_tour(plan, ground, robot, rng);
+    RobotPath path = try_path(plan, ground, route, robot, rng);
     if (!path.waypoints.empty() && keeps_clear(path, ground)) return path;
   }
   return {};

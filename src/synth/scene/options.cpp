@@ -15,8 +15,20 @@ void SynthOptions::declare(core::OptionTable& table) {
   table.integer("robots", robots, {1, 64}, "", "Number of recordings");
   table.integer("layout", layout, {-1, 2147483647}, "",
                 "Number from which a home, office or corridor is made; -1 = the scene as its file says");
+
+  table.choice(
+      "path", path,
+      {{"scene", Route::kScene},
+       {"tour", Route::kTour},
+       {"laps", Route::kLaps},
+       {"wander", Route::kWander},
+       {"there-and-back", Route::kThereAndBack}},
+      "Path through a world made from a number: all rooms, a loop through some, random places, or to "
+      "the other end and back; scene: as the scene file says, else a tour");
+
   table.integer("walkers", walkers, {0, 16}, "",
                 "Number of walkers in the scene: filmed, but no part of reference.ply");
+
   table.choice("texture", texture,
                {{"full", Texture::kFull}, {"weak", Texture::kWeak}, {"none", Texture::kNone}},
                "Strength of textures; none: white cloth and grey floors");
@@ -140,6 +152,21 @@ const char* to_string(Texture texture) {
 }
 const char* to_string(Sensor sensor) {
   return sensor == Sensor::kIdeal ? "ideal" : sensor == Sensor::kKinect ? "kinect" : "realsense";
+}
+const char* to_string(Route route) {
+  switch (route) {
+    case Route::kScene:
+      return "scene";
+    case Route::kTour:
+      return "tour";
+    case Route::kLaps:
+      return "laps";
+    case Route::kWander:
+      return "wander";
+    case Route::kThereAndBack:
+      return "there-and-back";
+  }
+  return "";
 }
 const char* to_string(Motion motion) {
   return motion == Motion::kScene ? "scene" : motion == Motion::kHandheld ? "handheld" : "wheeled";

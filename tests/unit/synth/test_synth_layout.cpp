@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <opencv2/core.hpp>
 
 #include "plumbline/core/log.hpp"
@@ -12,6 +13,14 @@ namespace plumbline::synth {
 namespace {
 
 using Eigen::Vector2d;
+
+core::Result<Scene> make(const std::string& kind, int number, int robots, Route path = Route::kScene) {
+  SynthOptions options;
+  options.layout = number;
+  options.robots = robots;
+  options.path = path;
+  return make_layout(kind, options);
+}
 
 double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
@@ -132,7 +141,7 @@ class SynthLayout : public testing::TestWithParam<const char*> {};
 
 TEST_P(SynthLayout, EveryNumberIsAWorldThatCanBeWalkedThrough) {
   for (int number = 0; number < 40; ++number) {
-    const auto scene = make_layout(GetParam(), number, 1);
+    const auto scene = make(GetParam(), number, 1);
     ASSERT_TRUE(scene) << scene.error().message;
     check_rooms(*scene);
     check_openings(*scene);
@@ -142,8 +151,8 @@ TEST_P(SynthLayout, EveryNumberIsAWorldThatCanBeWalkedThrough) {
 }
 
 TEST_P(SynthLayout, TheSameNumberIsTheSameWorldAndAnotherIsAnother) {
-  const auto first = make_layout(GetParam(), 3, 1), again = make_layout(GetParam(), 3, 2);
-  const auto other = make_layout(GetParam(), 4, 1);
+  const auto first = make(GetParam(), 3, 1), again = make(GetParam(), 3, 2);
+  const auto other = make(GetParam(), 4, 1);
   ASSERT_TRUE(first && again && other);
   const Scene& scene = *first;
   ASSERT_EQ(again->faces.size(), scene.faces.size());
@@ -156,12 +165,37 @@ TEST_P(SynthLayout, TheSameNumberIsTheSameWorldAndAnotherIsAnother) {
   EXPECT_NE(other->faces.size(), scene.faces.size());
 }
 
+TEST_P(SynthLayout, EveryPathIsFreeAndOfItsKind) {
+  const auto length = [](const RobotPath& path) {
+    double sum = 0.0;
+    for (std::size_t i = 1; i < path.waypoints.size(); ++i)
+      sum += (path.waypoints[i].position - path.waypoints[i - 1].position).norm();
+    return sum;
+  };
+
+  for (int number = 0; number < 3; ++number) {
+    std::map<Route, double> lengths;
+    for (const Route route : {Route::kTour, Route::kLaps, Route::kWander, Route::kThereAndBack}) {
+      const auto scene = make(GetParam(), number, 3, route);
+      ASSERT_TRUE(scene) << scene.error().message;
+      ASSERT_EQ(scene->robots.size(), 3U);
+      SynthOptions three;
+      three.robots = 3;
+      const auto free = check_paths(*scene, three);
+      EXPECT_TRUE(free) << to_string(route) << ": " << free.error().message;
+      lengths[route] = length(scene->robots[0]);
+    }
+    EXPECT_LT(lengths[Route::kLaps], lengths[Route::kTour]) << number;
+    EXPECT_LT(lengths[Route::kThereAndBack], lengths[Route::kTour]) << number;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Kinds, SynthLayout, testing::Values("home", "office", "corridor"));
 
 TEST(SynthLayoutNumbers, WorldsDiffer) {
   int tilted = 0, walls = 0, many_corners = 0;
   for (int number = 0; number < 40; ++number) {
-    const auto scene = make_layout("home", number, 1);
+    const auto scene = make("home", number, 1);
     ASSERT_TRUE(scene);
     for (const PlanWall& wall : scene->plan->walls) {
       tilted += std::min(std::abs(wall.direction.x()), std::abs(wall.direction.y())) > 0.01 ? 1 : 0;
@@ -180,6 +214,9 @@ TEST(SynthLayoutNumbers, SceneWithoutLayoutsIsRefused) {
   const auto none = open_scene("room", options, std::string(PLUMBLINE_SOURCE_DIR) + "/pipelines/scenes");
   ASSERT_FALSE(none);
   EXPECT_NE(none.error().message.find("home, office, corridor"), std::string::npos) << none.error().message;
+  SynthOptions laps;
+  laps.path = Route::kLaps;
+  EXPECT_FALSE(open_scene("room", laps, std::string(PLUMBLINE_SOURCE_DIR) + "/pipelines/scenes"));
   const auto home = open_scene("home", {}, std::string(PLUMBLINE_SOURCE_DIR) + "/pipelines/scenes");
   ASSERT_FALSE(home);
   EXPECT_NE(home.error().message.find("--layout"), std::string::npos) << home.error().message;
