@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstring>
+#include <sstream>
 
 #include "layout/layout.hpp"
 
@@ -14,137 +13,55 @@ using geometry::Rigid3;
 
 namespace {
 
-enum class Place { kWall, kHanging, kMiddle };
-
-/// A kind of thing: rooms that have it, how many for each square metre, its sizes, and what stands on it
-/// (m monitor, c clutter) or before it (h chair).
+/// A kind of thing, and how it is drawn.
 struct Rule {
-  const char* type;
-  const char* rooms;
-  Place place;
-  double per_m2;
-  double width[2], depth[2], height[2];  ///< smallest, largest, m; of hanging things: depth unused
-  const char* materials;                 ///< one of them, separated by blanks
-  const char* with;
+  std::string type;
+  std::string place;  ///< wall: its back to one; hanging: on one; middle: anywhere on the floor
+  double per_m2 = 0.0;
+  double width[2], depth[2], height[2];  ///< smallest and largest, m; hanging things have no depth
+  std::string materials;                 ///< one of them
+  std::string with;                      ///< on it m a monitor, c clutter; before it h a chair
+  std::string rooms;                     ///< kinds that have it
 };
 
-constexpr std::array kRules = {
-    Rule{
-        "bed", "bedroom", Place::kWall, 0.08, {0.9, 1.8}, {2.0, 2.1}, {0.42, 0.55}, "fabric curtain rug", ""},
-    Rule{"sofa", "living hall", Place::kWall, 0.06, {1.3, 2.4}, {0.8, 0.95}, {0.75, 0.9}, "sofa fabric", ""},
-    Rule{"cabinet", "bedroom", Place::kWall, 0.08, {0.9, 2.0}, {0.5, 0.62}, {1.8, 2.2}, "wood wood_dark", ""},
-    Rule{"cabinet",
-         "kitchen",
-         Place::kWall,
-         0.2,
-         {1.2, 2.6},
-         {0.6, 0.6},
-         {0.88, 0.92},
-         "wood paint_grey",
-         "c"},
-    Rule{
-        "cabinet", "kitchen", Place::kWall, 0.1, {0.6, 0.6}, {0.6, 0.65}, {1.7, 2.0}, "paint_grey metal", ""},
-    Rule{"desk",
-         "office study",
-         Place::kWall,
-         0.12,
-         {1.2, 1.8},
-         {0.65, 0.8},
-         {0.72, 0.76},
-         "wood wood_dark",
-         "mch"},
-    Rule{"desk", "bedroom", Place::kWall, 0.04, {1.0, 1.3}, {0.55, 0.65}, {0.72, 0.76}, "wood", "mch"},
-    Rule{"desk", "office", Place::kMiddle, 0.04, {1.4, 1.8}, {0.7, 0.8}, {0.72, 0.76}, "wood", "mch"},
-    Rule{"table",
-         "meeting",
-         Place::kMiddle,
-         0.05,
-         {1.6, 2.8},
-         {0.9, 1.2},
-         {0.72, 0.75},
-         "wood wood_dark",
-         "chh"},
-    Rule{
-        "table", "living kitchen", Place::kMiddle, 0.05, {1.0, 1.8}, {0.7, 0.9}, {0.72, 0.76}, "wood", "chh"},
-    Rule{
-        "table", "living hall", Place::kMiddle, 0.04, {0.7, 1.1}, {0.5, 0.6}, {0.38, 0.45}, "wood_dark", "c"},
-    Rule{"shelf",
-         "living office study store meeting",
-         Place::kWall,
-         0.1,
-         {0.8, 2.0},
-         {0.28, 0.4},
-         {1.2, 2.1},
-         "wood paint_grey wood_dark",
-         ""},
-    Rule{"cabinet",
-         "living office bath corridor hall meeting",
-         Place::kWall,
-         0.07,
-         {0.7, 1.8},
-         {0.35, 0.5},
-         {0.5, 1.1},
-         "wood wood_dark paint_grey",
-         "c"},
-    Rule{"box",
-         "store bedroom office kitchen",
-         Place::kWall,
-         0.1,
-         {0.3, 0.6},
-         {0.3, 0.5},
-         {0.25, 0.6},
-         "cardboard",
-         ""},
-    Rule{"box", "bath", Place::kWall, 0.15, {1.5, 1.7}, {0.7, 0.75}, {0.55, 0.6}, "ceramic", ""},
-    Rule{"box", "bath", Place::kWall, 0.25, {0.38, 0.6}, {0.45, 0.6}, {0.42, 0.85}, "ceramic", ""},
-    Rule{"plant",
-         "living office meeting corridor hall study",
-         Place::kWall,
-         0.04,
-         {0.6, 0.6},
-         {0.6, 0.6},
-         {0.8, 1.6},
-         "leaf",
-         ""},
-    Rule{"floor_lamp", "living bedroom", Place::kWall, 0.02, {0.4, 0.4}, {0.4, 0.4}, {1.5, 1.8}, "metal", ""},
-    Rule{"column",
-         "office hall living corridor",
-         Place::kMiddle,
-         0.012,
-         {0.22, 0.5},
-         {0.22, 0.5},
-         {9.0, 9.0},
-         "plaster paint_grey",
-         ""},
-    Rule{"poster",
-         "bedroom office study corridor meeting store",
-         Place::kHanging,
-         0.14,
-         {0.4, 0.9},
-         {0, 0},
-         {0.5, 1.1},
-         "poster",
-         ""},
-    Rule{"picture",
-         "living bedroom corridor hall kitchen office bath",
-         Place::kHanging,
-         0.12,
-         {0.4, 1.3},
-         {0, 0},
-         {0.4, 0.9},
-         "picture",
-         ""},
-    Rule{"whiteboard",
-         "office meeting study",
-         Place::kHanging,
-         0.05,
-         {1.0, 2.0},
-         {0, 0},
-         {0.8, 1.1},
-         "whiteboard",
-         ""},
-    Rule{"sign", "corridor hall office", Place::kHanging, 0.08, {0.2, 0.35}, {0, 0}, {0.12, 0.2}, "sign", ""},
-};
+constexpr const char* kRules = R"(
+bed        wall    0.08   0.9  1.8  2.0  2.1 0.42 0.55 fabric,curtain,rug         -    bedroom
+sofa       wall    0.06   1.3  2.4  0.8 0.95 0.75  0.9 sofa,fabric                -    living,hall
+cabinet    wall    0.08   0.9  2.0  0.5 0.62  1.8  2.2 wood,wood_dark             -    bedroom
+cabinet    wall    0.2    1.2  2.6  0.6  0.6 0.88 0.92 wood,paint_grey            c    kitchen
+cabinet    wall    0.1    0.6  0.6  0.6 0.65  1.7  2.0 paint_grey,metal           -    kitchen
+desk       wall    0.12   1.2  1.8 0.65  0.8 0.72 0.76 wood,wood_dark             mch  office,study
+desk       wall    0.04   1.0  1.3 0.55 0.65 0.72 0.76 wood                       mch  bedroom
+desk       middle  0.04   1.4  1.8  0.7  0.8 0.72 0.76 wood                       mch  office
+table      middle  0.05   1.6  2.8  0.9  1.2 0.72 0.75 wood,wood_dark             chh  meeting
+table      middle  0.05   1.0  1.8  0.7  0.9 0.72 0.76 wood                       chh  living,kitchen
+table      middle  0.04   0.7  1.1  0.5  0.6 0.38 0.45 wood_dark                  c    living,hall
+shelf      wall    0.1    0.8  2.0 0.28  0.4  1.2  2.1 wood,paint_grey,wood_dark  -    living,office,study,store,meeting
+cabinet    wall    0.07   0.7  1.8 0.35  0.5  0.5  1.1 wood,wood_dark,paint_grey  c    living,office,bath,corridor,hall,meeting
+box        wall    0.1    0.3  0.6  0.3  0.5 0.25  0.6 cardboard                  -    store,bedroom,office,kitchen
+box        wall    0.15   1.5  1.7  0.7 0.75 0.55  0.6 ceramic                    -    bath
+box        wall    0.25  0.38  0.6 0.45  0.6 0.42 0.85 ceramic                    -    bath
+plant      wall    0.04   0.6  0.6  0.6  0.6  0.8  1.6 leaf                       -    living,office,meeting,corridor,hall,study
+floor_lamp wall    0.02   0.4  0.4  0.4  0.4  1.5  1.8 metal                      -    living,bedroom
+column     middle  0.012 0.22  0.5 0.22  0.5  9.0  9.0 plaster,paint_grey         -    office,hall,living,corridor
+poster     hanging 0.14   0.4  0.9    0    0  0.5  1.1 poster                     -    bedroom,office,study,corridor,meeting,store
+picture    hanging 0.12   0.4  1.3    0    0  0.4  0.9 picture                    -    living,bedroom,corridor,hall,kitchen,office,bath
+whiteboard hanging 0.05   1.0  2.0    0    0  0.8  1.1 whiteboard                 -    office,meeting,study
+sign       hanging 0.08   0.2 0.35    0    0 0.12  0.2 sign                       -    corridor,hall,office
+)";
+
+const std::vector<Rule>& rules() {
+  static const std::vector<Rule> kAll = [] {
+    std::vector<Rule> all;
+    std::istringstream text(kRules);
+    for (Rule r; text >> r.type >> r.place >> r.per_m2 >> r.width[0] >> r.width[1] >> r.depth[0] >>
+                 r.depth[1] >> r.height[0] >> r.height[1] >> r.materials >> r.with >> r.rooms;) {
+      all.push_back(r);
+    }
+    return all;
+  }();
+  return kAll;
+}
 
 constexpr double kLeastFloor = 0.2;  // of a room's floor stays free to walk on, with clearance
 
@@ -180,15 +97,10 @@ struct Item {
   std::string material;
 };
 
-std::string pick_word(const char* words, Rng& rng) {
-  std::vector<std::string> list(1);
-  for (const char* c = words; *c != 0; ++c) {
-    if (*c == ' ') {
-      list.emplace_back();
-    } else {
-      list.back() += *c;
-    }
-  }
+std::string pick_word(const std::string& words, Rng& rng) {
+  std::vector<std::string> list;
+  std::istringstream text(words);
+  for (std::string word; std::getline(text, word, ',');) list.push_back(word);
   return rng.pick(list);
 }
 
@@ -229,9 +141,9 @@ class Furnisher {
   void fill(int room, double fullness) {
     room_ = room;
     const PlanRoom& r = plan_.rooms[static_cast<std::size_t>(room)];
-    for (const Rule& rule : kRules) {
-      if (std::strstr(rule.rooms, r.kind.c_str()) == nullptr) continue;
-      const double share = rule.type == std::string("column") ? 1.0 : 2.2 * fullness;
+    for (const Rule& rule : rules()) {
+      if (rule.rooms.find(r.kind) == std::string::npos) continue;
+      const double share = rule.type == "column" ? 1.0 : 2.2 * fullness;
       for (int n = static_cast<int>(r.area() * rule.per_m2 * share + rng_.uniform()); n > 0; --n) add(rule);
     }
   }
@@ -268,8 +180,8 @@ class Furnisher {
                 {rng_.uniform(rule.width[0], rule.width[1]), rng_.uniform(rule.depth[0], rule.depth[1]),
                  std::min(rng_.uniform(rule.height[0], rule.height[1]), room().height - 0.02)},
                 pick_word(rule.materials, rng_)};
-      if (rule.type == std::string("column")) item.size.z() = room().height;
-      if (rule.place == Place::kHanging ? hang(item, face) : stand(item, face)) return;
+      if (rule.type == "column") item.size.z() = room().height;
+      if (rule.place == "hanging" ? hang(item, face) : stand(item, face)) return;
     }
   }
 
@@ -284,8 +196,7 @@ class Furnisher {
 
     hung.push_back(part);
     item.frame = placed(item.frame, {x + 0.5 * item.size.x(), 0.0, z}, {0.0, Vector3d::UnitZ()});
-    const bool framed =
-        item.rule->type == std::string("picture") || item.rule->type == std::string("whiteboard");
+    const bool framed = item.rule->type == "picture" || item.rule->type == "whiteboard";
     begin(item.rule->type);
     add_panel(b_, item.frame, item.size.x(), item.size.z(), 0.008, item.material,
               framed ? "metal" : "paint_white", framed);
@@ -296,7 +207,7 @@ class Furnisher {
     const double length = (room().faces[face].from - room().faces[face].to).norm();
     const Vector2d half = 0.5 * item.size.head<2>();
 
-    if (item.rule->place == Place::kWall) {
+    if (item.rule->place == "wall") {
       const double x = rng_.uniform(half.x() + 0.02, std::max(half.x() + 0.02, length - half.x() - 0.02));
       item.frame = placed(item.frame, {x, -half.y() - 0.03, 0.0}, {0.0, Vector3d::UnitZ()});
     } else {
@@ -317,7 +228,7 @@ class Furnisher {
     add_company(item);
 
     // Nothing hangs behind a high thing, where it would not be seen.
-    if (item.rule->place == Place::kWall && item.size.z() > 1.0) {
+    if (item.rule->place == "wall" && item.size.z() > 1.0) {
       const double x = (item.frame.translation - face_frame(room().faces[face]).translation)
                            .dot(item.frame.rotation.col(0));
       hung_[static_cast<std::size_t>(room_)][face].push_back({x - half.x(), x + half.x()});
@@ -372,7 +283,7 @@ class Furnisher {
   /// Things on it and chairs before it.
   void add_company(const Item& item) {
     const Vector3d& s = item.size;
-    for (const char* with = item.rule->with; *with != 0; ++with) {
+    for (const char* with = item.rule->with.c_str(); *with != 0; ++with) {
       if (*with == 'm' && rng_.chance(0.8)) {
         begin("monitor");
         add_monitor(b_,
@@ -391,8 +302,7 @@ class Furnisher {
 
   void add_chairs(const Item& item, bool behind) {
     const double side = behind ? 1.0 : -1.0;
-    const int count =
-        item.rule->place == Place::kMiddle ? std::max(1, static_cast<int>(item.size.x() / 0.8)) : 1;
+    const int count = item.rule->place == "middle" ? std::max(1, static_cast<int>(item.size.x() / 0.8)) : 1;
     for (int i = 0; i < count; ++i) {
       const double x = ((i + 0.5) / count - 0.5) * item.size.x(), y = side * (0.5 * item.size.y() + 0.36);
       const Rigid3 frame = placed(item.frame, {x, y, 0.0}, {side < 0.0 ? M_PI : 0.0, Vector3d::UnitZ()});
