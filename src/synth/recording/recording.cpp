@@ -11,6 +11,7 @@
 #include "plumbline/core/version.hpp"
 #include "plumbline/dataset/image_io.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
+#include "recording/plan_file.hpp"
 #include "recording/reference.hpp"
 
 namespace plumbline::synth {
@@ -139,13 +140,23 @@ nlohmann::json describe_options(const SynthOptions& o) {
           {"events", o.events}};
 }
 
+/// With the options that only worlds made from a number have.
+nlohmann::json describe_options(const Scene& scene, const SynthOptions& options) {
+  nlohmann::json json = describe_options(options);
+  if (scene.plan) {
+    json["layout"] = options.layout;
+    json["path"] = to_string(options.path);
+  }
+  return json;
+}
+
 nlohmann::json describe_world(const Scene& scene, const SynthOptions& options, const WriteSummary& summary,
                               const nlohmann::json& robots) {
   return {{"scene", scene.name},
           {"scene_file", scene.file.filename().string()},
           {"description", scene.description},
           {"version", core::version()},
-          {"options", describe_options(options)},
+          {"options", describe_options(scene, options)},
           {"robots", robots},
           {"reference",
            {{"file", "reference.ply"},
@@ -203,6 +214,45 @@ Result<nlohmann::json> write_robots(const std::vector<std::unique_ptr<SynthSourc
   return robots;
 }
 
+/// Shares of a plan's walls and openings that were seen; their objects are in the order of the plan.
+PlanCoverage cover(const Scene& scene, const Visibility& visibility, const ReferenceCounts& counts) {
+  PlanCoverage coverage;
+  coverage.all = static_cast<double>(counts.visible) / std::max(1.0, static_cast<double>(counts.samples));
+
+  struct Sum {
+    double area = 0.0, seen = 0.0;
+    int faces = 0;
+  };
+  std::vector<Sum> sums(scene.objects.size());
+  for (std::size_t i = 0; i < scene.faces.size(); ++i) {
+    const auto object = static_cast<std::size_t>(scene.faces[i].object);
+    Sum& sum = sums[object];
+    const bool opening = scene.objects[object].type == "opening";
+    const double area = scene.faces[i].bounds().volume();
+
+    // The first two faces of an opening are its jambs; narrow faces of a wall are skirting and casings.
+    if (opening ? sum.faces++ > 1 : scene.faces[i].bounds().sizes().minCoeff() < 0.1) continue;
+    sum.area += area;
+    sum.seen += area * visibility.seen_share(i);
+  }
+
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    const double share = sums[i].area > 0.0 ? sums[i].seen / sums[i].area : 0.0;
+    if (scene.objects[i].type == "wall") coverage.wall_faces.push_back(share);
+    if (scene.objects[i].type == "opening") coverage.jambs.push_back(share);
+  }
+  return coverage;
+}
+
+/// The true plan, if the scene has one.
+Result<void> write_plan(const Scene& scene, const std::vector<std::unique_ptr<SynthSource>>& sources,
+                        const std::optional<PlanCoverage>& coverage, const fs::path& output) {
+  if (!scene.plan) return {};
+  std::vector<geometry::Rigid3> starts;
+  for (const auto& source : sources) starts.push_back(source->world_from_camera(source->info(0).stamp));
+  return core::write_file(output / "plan.json", describe_plan(*scene.plan, starts, coverage));
+}
+
 }  // namespace
 
 Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& options, const fs::path& output,
@@ -223,6 +273,7 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
   summary.reference_spacing_m =
       options.reference_spacing > 0.0 ? options.reference_spacing : default_spacing(scene);
 
+  std::optional<PlanCoverage> coverage;
   if (!stop.stop_requested()) {
     Visibility visibility(*world, summary.reference_spacing_m);
     for (const auto& source : *sources) visibility.add(*source, executor, stop);
@@ -231,7 +282,9 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
     if (!counts) return fail(counts.error());
     summary.reference_samples = counts->samples;
     summary.reference_visible = counts->visible;
+    if (scene.plan) coverage = cover(scene, visibility, *counts);
   }
+  if (auto ok = write_plan(scene, *sources, coverage, output); !ok) return fail(ok.error());
 
   summary.stopped = stop.stop_requested();
   const std::string json = core::json_text(describe_world(scene, options, summary, *robots));

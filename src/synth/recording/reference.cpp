@@ -104,6 +104,14 @@ bool Visibility::seen(std::size_t face, double u, double v) const {
   return flags_[g.at(i, j)] != 0;
 }
 
+double Visibility::seen_share(std::size_t face) const {
+  const Grid& g = grids_[face];
+  const std::size_t count = static_cast<std::size_t>(g.columns) * static_cast<std::size_t>(g.rows);
+  std::size_t seen = 0;
+  for (std::size_t i = g.first; i < g.first + count; ++i) seen += flags_[i] != 0 ? 1 : 0;
+  return static_cast<double>(seen) / static_cast<double>(count);
+}
+
 /// By face.
 static std::vector<char> faces_in(const View& view, std::size_t count) {
   std::vector<char> present(count, 0);

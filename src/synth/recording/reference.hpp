@@ -22,6 +22,8 @@ class Visibility {
   /// Marks what one source saw, looking through some of its frames.
   void add(const SynthSource& source, const core::Executor& executor, const core::StopToken& stop);
   [[nodiscard]] bool seen(std::size_t face, double u, double v) const;
+  /// Share of a face's blocks that were seen.
+  [[nodiscard]] double seen_share(std::size_t face) const;
   [[nodiscard]] double block() const { return block_; }
 
  private:

@@ -2,11 +2,16 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
 #include "plumbline/core/log.hpp"
+#include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/synth/layout.hpp"
+#include "plumbline/synth/recording.hpp"
 #include "plumbline/synth/source.hpp"
 
 namespace plumbline::synth {
@@ -206,6 +211,61 @@ TEST(SynthLayoutNumbers, WorldsDiffer) {
   EXPECT_GT(tilted, 0);
   EXPECT_LT(tilted, walls / 5);
   EXPECT_GT(many_corners, 5);
+}
+
+TEST(SynthLayoutNumbers, PlanFileHasTheTruth) {
+  struct Silent : core::Log {
+    void write(core::LogLevel, const std::string&) override {}
+  } log;
+  const auto scene = make("home", 1, 2);
+  ASSERT_TRUE(scene);
+  SynthOptions options;
+  options.layout = 1;
+  options.robots = 2;
+  options.frames = 1;
+  options.width = 64;
+  options.height = 48;
+  options.reference_spacing = 0.1;
+  const auto folder = std::filesystem::path(testing::TempDir()) / "synth_plan";
+  std::filesystem::remove_all(folder);
+  ASSERT_TRUE(write_recordings(*scene, options, folder, core::Executor(1), {}, log, {}));
+
+  const auto plan = nlohmann::json::parse(std::ifstream(folder / "plan.json"));
+  ASSERT_EQ(plan["rooms"].size(), scene->plan->rooms.size());
+  double most_seen = 0.0, least_seen = 1.0;
+  for (const auto& room : plan["rooms"]) {
+    std::vector<Vector2d> outline;
+    for (const auto& p : room["outline_m"]) outline.emplace_back(p[0], p[1]);
+    EXPECT_NEAR(signed_area(outline), room["area_m2"], 1e-9);
+    EXPECT_EQ(room["faces"].size(), outline.size());
+    for (const auto& face : room["faces"]) {
+      most_seen = std::max(most_seen, double(face["seen"]));
+      least_seen = std::min(least_seen, double(face["seen"]));
+    }
+  }
+
+  // One frame of each robot sees part of a wall or two.
+  EXPECT_GT(most_seen, 0.02);
+  EXPECT_EQ(least_seen, 0.0);
+  EXPECT_GT(plan["seen"], 0.0);
+  EXPECT_LT(plan["seen"], 0.2);
+
+  for (const auto& o : plan["openings"]) {
+    EXPECT_LE(o["jambs_seen"], 1.0);
+    const auto& jambs = o["jambs_m"];
+    EXPECT_NEAR(
+        std::hypot(double(jambs[1][0]) - double(jambs[0][0]), double(jambs[1][1]) - double(jambs[0][1])),
+        o["width_m"], 1e-9);
+    EXPECT_EQ(o.contains("leaf"), o["kind"] == "door");
+  }
+
+  ASSERT_EQ(plan["robots"].size(), 2U);
+  const auto truth = dataset::read_trajectory(folder / "robot1/groundtruth.txt");
+  ASSERT_TRUE(truth);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_NEAR(plan["robots"][1]["world_from_first_camera"][i][3],
+                truth->front().world_from_camera.translation[i], 0.01);
+  }
 }
 
 TEST(SynthLayoutNumbers, SceneWithoutLayoutsIsRefused) {
