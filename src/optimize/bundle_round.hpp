@@ -99,8 +99,7 @@ class SchurComplement {
   }
   [[nodiscard]] double squared_pose_steps() const { return pose_steps_.squaredNorm(); }
   /// Diagonal blocks of the inverse, with the damping of the poses only, at radius 1: the covariances of free
-  /// poses. Empty: singular. `least_share`: of LandmarkFamily::invert_held; 0: landmarks are inverted as they
-  /// are.
+  /// poses. Empty: singular. `least_share`: see LandmarkFamily::invert_held.
   std::vector<geometry::Matrix6d> inverse_blocks(NormalEquations& equations, double least_share);
   /// True if inverse_blocks() keeps within `most` numbers.
   [[nodiscard]] bool fits(NormalEquations& equations, std::size_t most);

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <limits>
-
 #include "bundle_round.hpp"
 #include "plumbline/core/clones.hpp"
 
@@ -8,8 +6,6 @@ namespace plumbline::optimize {
 namespace {
 
 using geometry::Matrix6d;
-
-constexpr double kNoRadius = std::numeric_limits<double>::infinity();
 
 /// y w^T is subtracted from each target, a 6x6 block of a matrix whose columns are `stride` long; y and w are
 /// 6 x unknowns.
@@ -107,7 +103,7 @@ bool SchurComplement::solve(NormalEquations& equations, double radius) {
 
 bool SchurComplement::fits(NormalEquations& equations, std::size_t most) {
   if (!sparse_) return true;
-  assemble(equations, kNoRadius);
+  assemble(equations, 1.0);
   return sparse_->factor_numbers() <= most;
 }
 
@@ -115,13 +111,8 @@ bool SchurComplement::fits(NormalEquations& equations, std::size_t most) {
 /// on are not zero. Several poses are solved at a time, as each needs all of L.
 std::vector<Matrix6d> SchurComplement::inverse_blocks(NormalEquations& equations, double least_share) {
   constexpr int kAtATime = 16;
-  if (least_share > 0.0) {
-    equations.points.invert_held(least_share);
-    equations.lines.invert_held(least_share);
-  } else {
-    equations.points.invert(kNoRadius);
-    equations.lines.invert(kNoRadius);
-  }
+  equations.points.invert_held(least_share);
+  equations.lines.invert_held(least_share);
   assemble(equations, 1.0);
   if (sparse_) return sparse_->inverse_blocks();
   const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(matrix_);

@@ -9,6 +9,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "plumbline/geometry/rigid3.hpp"
@@ -115,14 +116,17 @@ struct LandmarkFamily {
     }
   }
 
-  /// Inverts each landmark's block without damping; along directions with less than this share of the
-  /// information of the best one, in units that make the parameters alike, the inverse is zero.
+  /// Inverts each landmark's block without damping. If a direction has less than this share of the
+  /// information of the best one, in units that make the parameters alike, the inverse is zero along it.
   void invert_held(double least_share) {
+    invert(std::numeric_limits<double>::infinity());
     for (std::size_t n = 0; n < hessian.size(); ++n) {
       const Vector unit =
           (hessian[n].diagonal().array() > 0.0).select(hessian[n].diagonal().array().sqrt().inverse(), 1.0);
       const Eigen::SelfAdjointEigenSolver<Square> eigen(unit.asDiagonal() * hessian[n] * unit.asDiagonal());
       const double least = least_share * eigen.eigenvalues()(kUnknowns - 1);
+      if (eigen.eigenvalues()(0) > least) continue;
+
       inverse[n].setZero();
       for (int i = 0; i < kUnknowns; ++i) {
         if (!(eigen.eigenvalues()(i) > least)) continue;

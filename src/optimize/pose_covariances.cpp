@@ -43,7 +43,7 @@ void remove_prior(const std::vector<Matrix6d>& with_twice, std::vector<Matrix6d>
 
 /// Covariances of the free poses with a prior of this information, 1/m^2 and 1/rad^2, on each of them.
 std::vector<Matrix6d> BundleRound::held_by_prior(double information) {
-  constexpr double kLeastShare = 1e-9;  // below, rounding errors exceed what is taken out
+  constexpr double kLeastShare = 1e-9;
   for (Damping<6>& damping : equations_.damping) damping.diagonal.setConstant(information);
   return reduced_.inverse_blocks(equations_, kLeastShare);
 }
@@ -73,7 +73,8 @@ PoseCovariances BundleRound::covariances(const BundleState& state) {
                 std::to_string(kMostNumbers / 1'000'000) + " million numbers would be needed"};
   }
 
-  std::vector<Matrix6d> blocks = reduced_.inverse_blocks(equations_, 0.0);
+  constexpr double kLeastShare = 1e-13;  // below, rounding errors are as large as what is taken out
+  std::vector<Matrix6d> blocks = reduced_.inverse_blocks(equations_, kLeastShare);
   if (!are_held(blocks)) blocks = repaired();
   if (blocks.empty() && slots_.free > 0) return {{}, "the equations of the adjustment cannot be solved"};
 
