@@ -6,11 +6,12 @@
 #include <utility>
 
 #include "plumbline/maps/output_folder.hpp"
+#include "plumbline/maps/unfinished_run.hpp"
 
 namespace plumbline::maps {
 
 /// In OUT.partial while its run writes there, locked by it.
-inline constexpr const char* kUnfinished = ".plumbline-unfinished";
+inline constexpr const char* kUnfinished = kUnfinishedMarker;
 /// The same file once the result is complete. It stays if it names files that are none of FolderKind.
 inline constexpr const char* kFiles = kFilesMarker;
 
