@@ -166,6 +166,11 @@ core::Result<void> describe_live(InfoRequest& request) {
 }
 
 core::Result<void> info(Session& session, InfoRequest& request) {
+  if (request.open.format == "json") {
+    request.json = true;
+    request.open.format = "auto";
+  }
+
   std::error_code ec;
   const std::filesystem::path path = request.input;
   const auto map = maps::find_map(path);  // also of a run that was interrupted and has left no `path`
@@ -205,8 +210,12 @@ void add_info(CLI::App& app, Session& session) {
   command->add_option("--camera", request->open.camera, "Shipped calibration or file")
       ->type_name("NAME|FILE");
   add_topic_option(*command, request->open);
-  command->add_option("--format", request->open.format, "Layout of the recording (default: auto)")
-      ->check(CLI::IsMember(dataset::layout_names()));
+  auto formats = dataset::layout_names();
+  formats.emplace_back("json");
+  command
+      ->add_option("--format", request->open.format,
+                   "Layout of the recording (default: auto); json: as --json")
+      ->check(CLI::IsMember(formats));
   command->add_flag("--json", request->json, "Print all that a result's summary.json says, as JSON");
 }
 

@@ -79,6 +79,7 @@ TEST_F(Tools, InfoOfAResultIsAPage) {
   const Outcome all = run("info out --json");
   EXPECT_EQ(all.code, 0) << all;
   EXPECT_EQ(nlohmann::json::parse(all.out), summary);
+  EXPECT_EQ(run("info out --format json").out, all.out);
   EXPECT_EQ(run("info out/map.ply --json").code, 2);
 
   write("out/summary.json", "{\"frames\": " + std::string(100000, '[') + "}");
