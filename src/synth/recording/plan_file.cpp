@@ -6,6 +6,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "plumbline/core/json.hpp"
+
 namespace plumbline::synth {
 
 namespace {
@@ -127,7 +129,7 @@ std::string describe_plan(const Plan& plan, const std::vector<geometry::Rigid3>&
   file["openings"] = openings;
   file["things"] = things;
   file["robots"] = robots;
-  return file.dump(1) + "\n";
+  return core::json_text(file, 1);
 }
 
 }  // namespace plumbline::synth
