@@ -59,6 +59,19 @@ bool is_own_folder(const std::string& path, const FileNames& names) {
   return false;
 }
 
+/// As files_below(); `ec` tells that a folder could not be listed, and the list is not whole.
+std::vector<std::string> listed_below(const fs::path& folder, std::error_code& ec) {
+  std::vector<std::string> files;
+  for (fs::recursive_directory_iterator it(folder, ec), end; !ec && it != end; it.increment(ec)) {
+    std::error_code unknown;
+    const bool is_folder = fs::is_directory(it->symlink_status(unknown));
+    if (is_folder && !fs::is_empty(it->path(), unknown)) continue;
+    files.push_back(it->path().lexically_relative(folder).generic_string() + (is_folder ? "/" : ""));
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
 }  // namespace
 
 bool is_own_file(const std::string& path, const FileNames& names) {
@@ -68,16 +81,8 @@ bool is_own_file(const std::string& path, const FileNames& names) {
 }
 
 std::vector<std::string> files_below(const fs::path& folder) {
-  std::vector<std::string> files;
-  std::error_code ec;
-  for (fs::recursive_directory_iterator it(folder, ec), end; !ec && it != end; it.increment(ec)) {
-    std::error_code unknown;
-    const bool is_folder = fs::is_directory(it->symlink_status(unknown));
-    if (is_folder && !fs::is_empty(it->path(), unknown)) continue;
-    files.push_back(it->path().lexically_relative(folder).generic_string() + (is_folder ? "/" : ""));
-  }
-  std::sort(files.begin(), files.end());
-  return files;
+  std::error_code unlisted;
+  return listed_below(folder, unlisted);
 }
 
 std::vector<std::string> foreign_files(const fs::path& folder, const FileNames& names) {
@@ -99,8 +104,13 @@ std::string list_of_files(const std::vector<std::string>& files) {
 }
 
 Result<void> remove_own_files(const fs::path& folder, const FileNames& names) {
+  std::error_code unlisted;
+  const std::vector<std::string> files = listed_below(folder, unlisted);
+  if (unlisted && unlisted != std::errc::no_such_file_or_directory)
+    return output_error(folder.string() + ": cannot be listed (" + unlisted.message() + ")");
+
   std::set<std::string> folders;
-  for (const std::string& file : files_below(folder)) {
+  for (const std::string& file : files) {
     const bool is_folder = file.back() == '/';
     const std::string path = is_folder ? file.substr(0, file.size() - 1) : file;
     if (is_folder ? !is_own_folder(path, names) : !is_own_file(path, names)) continue;

@@ -389,7 +389,7 @@ class Results(Folder):
             shutil.copytree(self.recording, folder)
             result = plumbline.map(folder, self.work / "named", end=0.4, force=True, **{"output.views": ""})
             self.assertEqual(set(result.keyframes.robots), {told})
-            self.assertEqual(result.summary["input"], told)
+            self.assertEqual(os.path.basename(result.summary["input"]), told)
 
     def test_a_damaged_table_is_an_input_error(self):
         folder = self.work / "damaged"
