@@ -59,7 +59,7 @@ bool is_own_folder(const std::string& path, const FileNames& names) {
   return false;
 }
 
-/// As files_below(); `ec` tells that a folder could not be listed, and the list is not whole.
+/// Gives what files_below() gives; `ec` tells that a folder could not be listed, and the list is not whole.
 std::vector<std::string> listed_below(const fs::path& folder, std::error_code& ec) {
   std::vector<std::string> files;
   for (fs::recursive_directory_iterator it(folder, ec), end; !ec && it != end; it.increment(ec)) {
