@@ -387,9 +387,11 @@ class Results(Folder):
         for name, told in (('a, "b"', 'a, "b"'), ("=1+1", "=1+1"), ("two\nlines", "two\\nlines"), (b"caf\xe9", "caf\ufffd")):
             folder = Path(os.fsdecode(os.fsencode(self.work) + b"/" + os.fsencode(name)))
             shutil.copytree(self.recording, folder)
-            result = plumbline.map(folder, self.work / "named", end=0.4, force=True, **{"output.views": ""})
+            mapped = subprocess.run([PROGRAM, "map", folder, "-o", self.work / "named", "--to", "0.4", "--force", "-q", "--set", "output.views="])
+            self.assertIn(mapped.returncode, (0, 4))
+            result = plumbline.load(self.work / "named")
             self.assertEqual(set(result.keyframes.robots), {told})
-            self.assertEqual(os.path.basename(result.summary["input"]), told)
+            self.assertEqual(os.path.basename(result.summary["input"]), told.replace("\\n", "\n"))
 
     def test_a_damaged_table_is_an_input_error(self):
         folder = self.work / "damaged"
