@@ -328,6 +328,7 @@ core::Result<void> OutputFolder::put_in_place() {
     std::ofstream(target_ / kReplaced).flush();
     fs::rename(target_, old, ec);
   }
+
   if (!ec) fs::rename(partial_, target_, ec);
   if (ec) {
     std::error_code ignored;
