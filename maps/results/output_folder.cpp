@@ -281,14 +281,13 @@ core::Result<void> OutputFolder::check_there() const {
   }
   return core::output_error(
       fmt::format("{}: was removed or moved away while the run was writing there; start the run again, and "
-                  "leave that folder "
-                  "alone until it is renamed to {}",
+                  "leave that folder alone until it is renamed to {}",
                   partial_.string(), target_.filename().string()));
 }
 
-core::Error OutputFolder::explained(core::Error error) const {
+core::Error OutputFolder::explained(const core::Error& error) const {
   const auto there = check_there();
-  return there ? std::move(error) : there.error();
+  return there ? error : there.error();
 }
 
 core::Result<void> OutputFolder::mark_complete() {
