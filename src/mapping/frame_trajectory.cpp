@@ -40,11 +40,4 @@ geometry::Vector6d FrameTrajectory::velocity(const maps::Map& map) const {
   return geometry::log_se3(now_from_world * before_from_world.inverse()) / dt;
 }
 
-Rigid3 FrameTrajectory::depth_from_camera(const maps::Map& map, const sensor::RgbdFrame& frame) const {
-  constexpr double kMost_s = 0.05;
-  const double dt = frame.depth_stamp - frame.stamp;
-  if (dt == 0.0 || std::abs(dt) > kMost_s) return {};
-  return geometry::exp_se3(velocity(map) * dt);
-}
-
 }  // namespace plumbline::mapping

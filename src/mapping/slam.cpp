@@ -150,9 +150,10 @@ Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32
   });
 }
 
-FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& features) {
+FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& features, Keyframe keyframe) {
   // Results of work beside the tracker are used at fixed frames, independent of the clock.
   ++frame_count_;
+  if (keyframe == Keyframe::kYes) finish();
   BundleReport bundle;
   while (!new_keyframes_.empty() && frame_count_ >= new_keyframes_.front().frame + kConnectAfter)
     connect_keyframe(bundle);
@@ -194,6 +195,7 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& featur
     report.decision.wanted = !track.reference.valid();  // where nothing of this map is seen
     if (!report.decision.wanted)
       report.decision = keyframe_rule_.decide(map_, track, new_keyframes_.empty() && bundle_.idle());
+    if (keyframe != Keyframe::kByRule) report.decision.wanted = keyframe == Keyframe::kYes;
     if (report.decision.reuse.valid())  // otherwise the map would grow as long as the camera moves
       set_reference(report.reference = report.decision.reuse);
     if (report.decision.wanted) insert_keyframe(frame, features, report);
@@ -203,7 +205,7 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& featur
   frames_.record(map_, pose, tracker_.reference(),
                  pose.tracked ? tracker_.camera_from_world() : track.camera_from_world);
   if (pose.tracked) report.component = maps::root_of(map_, tracker_.reference());
-  if (options_.tracker.align_stamps) report.depth_from_camera = frames_.depth_from_camera(map_, frame);
+  report.depth_from_camera = track.depth_from_camera;
   return report;
 }
 

@@ -32,11 +32,10 @@ std::optional<optimize::PhotometricFamily> comparable(const PhotometricKeyframes
 
 }  // namespace
 
-TrackResult Tracker::align(const maps::Map& map, const sensor::RgbdFrame& frame,
-                           const features::FrameFeatures& features, const Rigid3& hypothesis,
+TrackResult Tracker::align(const maps::Map& map, const TrackedImage& image, const Rigid3& hypothesis,
                            double search_radius_px) const {
-  const AlignmentInput input{
-      options_, camera_, map, local_map_, photometric_, motion_, frame, features, depth_from_camera(frame)};
+  const AlignmentInput input{options_,     camera_, map,   local_map_,
+                             photometric_, motion_, image, depth_delay_s(image.frame)};
   return FrameAligner(input, hypothesis, search_radius_px).run();
 }
 
@@ -116,12 +115,12 @@ bool Tracker::jumps(double stamp, const Rigid3& camera_from_world) const {
 }
 
 std::optional<TrackResult> Tracker::track_with_motion_model(const maps::Map& map,
-                                                            const sensor::RgbdFrame& frame,
-                                                            const features::FrameFeatures& features) const {
+                                                            const TrackedImage& image) const {
   constexpr double kClearly = 1.15;  // more support than the pose near by, or than the likeliest one
   if (motion_.expired()) return std::nullopt;
 
-  const PoseHypotheses hypotheses = pose_hypotheses(map, frame, features);
+  const features::FrameFeatures& features = *image.synchronised;
+  const PoseHypotheses hypotheses = pose_hypotheses(map, image.frame, features);
   const auto tracked = [&](const TrackResult& attempt) {
     return attempt.state == TrackState::kTracked &&
            (!motion_.outdated() || passes_strict_check(attempt, features));
@@ -129,11 +128,11 @@ std::optional<TrackResult> Tracker::track_with_motion_model(const maps::Map& map
 
   std::optional<TrackResult> best;
   for (const Rigid3& hypothesis : hypotheses.camera_from_world) {
-    TrackResult attempt = align(map, frame, features, hypothesis, motion_.search_radius_px());
+    TrackResult attempt = align(map, image, hypothesis, motion_.search_radius_px());
     // Among look-alikes, the keys of a keyboard, wrong matches of the wide search can pull the pose further
     // than the fine rounds look: the right ones around the hypothesis would never be tried.
-    if (jumps(frame.stamp, attempt.camera_from_world)) {
-      TrackResult near = align(map, frame, features, hypothesis, 0.0);
+    if (jumps(image.frame.stamp, attempt.camera_from_world)) {
+      TrackResult near = align(map, image, hypothesis, 0.0);
       if (tracked(near) && !(tracked(attempt) && support(attempt) > kClearly * support(near)))
         attempt = std::move(near);
     }
@@ -141,7 +140,7 @@ std::optional<TrackResult> Tracker::track_with_motion_model(const maps::Map& map
     const double share = hypotheses.searched ? 1.0 : kClearly;
     if (tracked(attempt) && (!best || support(attempt) > share * support(*best))) best = std::move(attempt);
     // A pose that jumps may fit another copy of the same landmarks: the other hypotheses are tried as well.
-    if (best && !hypotheses.searched && !jumps(frame.stamp, best->camera_from_world)) break;
+    if (best && !hypotheses.searched && !jumps(image.frame.stamp, best->camera_from_world)) break;
   }
 
   return best;
@@ -179,16 +178,16 @@ std::vector<Tracker::PlaceHypothesis> Tracker::place_hypotheses(
   return hypotheses;
 }
 
-std::optional<TrackResult> Tracker::relocalise(const maps::Map& map, const sensor::RgbdFrame& frame,
-                                               const features::FrameFeatures& features) {
+std::optional<TrackResult> Tracker::relocalise(const maps::Map& map, const TrackedImage& image) {
+  const features::FrameFeatures& features = *image.synchronised;
   const std::vector<PlaceHypothesis> hypotheses = place_hypotheses(map, features);
   LocalMap before = std::move(local_map_);
   for (const PlaceHypothesis& place : hypotheses) {
     local_map_ = build_local_map(map, place.keyframe, options_.local_map);
-    TrackResult attempt = align(map, frame, features, place.camera_from_world, place.coarse ? 24.0 : 10.0);
+    TrackResult attempt = align(map, image, place.camera_from_world, place.coarse ? 24.0 : 10.0);
     if (attempt.state != TrackState::kTracked || attempt.dead_reckoned) continue;
     if (place.coarse && !passes_strict_check(attempt, features)) continue;
-    if (is_place_ && !is_place_(frame, features, place.keyframe, attempt.camera_from_world)) continue;
+    if (is_place_ && !is_place_(image.frame, features, place.keyframe, attempt.camera_from_world)) continue;
     attempt.relocalised = true;
     motion_.reset();
     return attempt;

@@ -10,6 +10,16 @@ geometry::Rigid3 MotionModel::predict(double stamp) const {
   return motion_within(std::clamp(stamp - stamp_, 0.0, 0.2)) * camera_from_world_;
 }
 
+std::optional<geometry::Vector6d> MotionModel::velocity_after(double stamp, const geometry::Rigid3& pose,
+                                                              double dt) const {
+  const double step_s = stamp - stamp_;
+  if (!continuous() || !(step_s > 1e-4 && step_s < 0.5)) return std::nullopt;
+  // Velocities are means over their steps; that of the middle of `dt` lies half a step and dt / 2 further on.
+  const geometry::Vector6d mean = geometry::log_se3(pose * camera_from_world_.inverse()) / step_s;
+  if (velocity_.isZero(0.0)) return mean;
+  return mean + (0.5 + 0.5 * dt / step_s) * (mean - velocity_);
+}
+
 bool MotionModel::reliable(double stamp) const {
   constexpr double kLonger = 1.5;
   if (continuous() && knows_odometry()) return true;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/tracking/tracker.hpp"
 
+#include "alignment/image_motion.hpp"
+
 namespace plumbline::tracking {
 namespace {
 
@@ -60,15 +62,15 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
   motion_.set_odometry(frame.odometry);
   if (map.keyframe_count() == 0) return initialise(frame, features);
 
-  const Features synced = synchronised(frame, features, motion_.velocity());
+  const ImageMotion motion{options_.readout_s * motion_.velocity(),
+                           motion_.motion_within(depth_delay_s(frame))};
+  const TrackedImage image{frame, features, motion, synchronised(features, frame.depth, camera_, motion)};
   const bool outdated = motion_.outdated();
-  std::optional<TrackResult> result =
-      outdated ? relocalise(map, frame, *synced) : track_with_motion_model(map, frame, *synced);
-  if (!result)
-    result = outdated ? track_with_motion_model(map, frame, *synced) : relocalise(map, frame, *synced);
+  std::optional<TrackResult> result = outdated ? relocalise(map, image) : track_with_motion_model(map, image);
+  if (!result) result = outdated ? track_with_motion_model(map, image) : relocalise(map, image);
   if (!result) return lost(frame);
 
-  if (result->features == nullptr) result->features = synced;
+  if (result->features == nullptr) result->features = image.synchronised;
   record(frame, *result);
   return *std::move(result);
 }

@@ -27,9 +27,6 @@ class FrameTrajectory {
 
   /// The motion of camera_from_world between the last two frames, per second; zero when that is not known.
   [[nodiscard]] geometry::Vector6d velocity(const maps::Map& map) const;
-  /// Motion of the camera from the colour to the depth image of the frame recorded last.
-  [[nodiscard]] geometry::Rigid3 depth_from_camera(const maps::Map& map,
-                                                   const sensor::RgbdFrame& frame) const;
   [[nodiscard]] const std::vector<maps::FramePose>& poses() const { return poses_; }
 
  private:

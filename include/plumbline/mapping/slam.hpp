@@ -88,6 +88,7 @@ class Slam {
   /// empty.
   void recalibrate(const sensor::Camera& camera, const PictureReader& read);
   [[nodiscard]] const sensor::Camera& camera() const { return camera_; }
+  [[nodiscard]] const sensor::Pinhole& image() const { return image_; }
 
   /// From now on maps of other robots are used for relocalisation and loops (without the option loops: for
   /// nothing). This map then depends on the received maps and their times.
@@ -96,8 +97,10 @@ class Slam {
   }
 
   using Features = std::shared_ptr<const features::FrameFeatures>;
+  enum class Keyframe { kByRule, kYes, kNo };  ///< whether a frame becomes a keyframe
   /// Frames in order of time. The features are kept when the frame becomes a keyframe.
-  FrameReport process(const sensor::RgbdFrame& frame, const Features& features);
+  FrameReport process(const sensor::RgbdFrame& frame, const Features& features,
+                      Keyframe keyframe = Keyframe::kByRule);
   /// Ends the background work; call once, after the last frame.
   void finish();
 
@@ -119,6 +122,8 @@ class Slam {
   [[nodiscard]] const tracking::TrackResult& last_track() const { return last_track_; }
   /// Every frame in order, relative to its keyframe.
   [[nodiscard]] const std::vector<maps::FramePose>& frame_poses() const { return frames_.poses(); }
+  /// Replaces them, of the same recording, for a map that was made of some of its frames only.
+  void set_frames(std::vector<maps::FramePose> frames) { frames_ = FrameTrajectory(std::move(frames)); }
   /// Poses after optimisation: tracked frames only, in order of time.
   [[nodiscard]] geometry::Trajectory trajectory() const;
 

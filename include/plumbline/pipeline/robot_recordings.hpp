@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,8 @@ class RobotRecordings : public dataset::FrameSource {
   [[nodiscard]] std::size_t frames_of(std::int32_t robot) const {
     return recordings_[static_cast<std::size_t>(robot)]->size();
   }
+  /// Number of the frame with this stamp within a robot's recording; none: there is no such frame.
+  [[nodiscard]] std::optional<std::size_t> frame_at(std::int32_t robot, double stamp) const;
   /// Time of a frame, seconds since the run began.
   [[nodiscard]] double time_of(std::size_t index) const { return place(index).time; }
 

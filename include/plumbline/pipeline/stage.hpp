@@ -10,6 +10,7 @@
 // one line to register_stages() (src/pipeline/stages/registry.cpp). A new port type needs a tap as well
 // (src/pipeline/taps/tap_<name>.cpp).
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -34,6 +35,14 @@ class FrameSource;
 
 namespace plumbline::exports {
 struct ExportRequest;
+}
+
+namespace plumbline::features {
+struct FrameFeatures;
+}
+
+namespace plumbline::sensor {
+struct RgbdFrame;
 }
 
 namespace plumbline::mapping {
@@ -150,6 +159,14 @@ struct RunHooks {
   std::function<void(const std::string&)> finishing;  ///< RunRequest::finishing
 };
 
+/// What a stage does for others besides its outputs.
+struct RunServices {
+  /// The features of a robot's frame, as the pipeline finds them; empty: it has no such stage. May be called
+  /// from several threads at a time.
+  std::function<std::shared_ptr<const features::FrameFeatures>(const sensor::RgbdFrame&, std::int32_t robot)>
+      features;
+};
+
 /// Resources that a run lends to its stages; outlives them.
 struct RunContext {
   const core::Executor* executor = nullptr;
@@ -160,6 +177,7 @@ struct RunContext {
   const ResumedRun* resumed = nullptr;  ///< results of the resumed run; null: none
   RunStore store;
   RunHooks hooks;
+  std::shared_ptr<RunServices> services = std::make_shared<RunServices>();  ///< filled by starting stages
   core::StopToken asked;  ///< by the user; `stop` is another one for sources that end by themselves
 };
 

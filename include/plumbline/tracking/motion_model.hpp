@@ -23,6 +23,11 @@ class MotionModel {
   /// The motion of camera_from_world within `dt` seconds.
   [[nodiscard]] geometry::Rigid3 motion_within(double dt) const { return geometry::exp_se3(velocity_ * dt); }
 
+  /// Mean velocity during the `dt` seconds after `stamp`, if camera_from_world is `pose` then: that of the
+  /// last steps, continued linearly. None: the frame before is lost or too long ago.
+  [[nodiscard]] std::optional<geometry::Vector6d> velocity_after(double stamp, const geometry::Rigid3& pose,
+                                                                 double dt) const;
+
   /// Updates the model with a tracked frame.
   void update(double stamp, const TrackResult& result);
   /// Updates the model with a lost frame.

@@ -92,6 +92,8 @@ struct TrackResult {
   std::shared_ptr<const features::FrameFeatures> features;
 };
 
+struct TrackedImage;
+
 class Tracker {
  public:
   Tracker(const TrackerOptions& options, const sensor::Pinhole& camera);
@@ -163,11 +165,10 @@ class Tracker {
   [[nodiscard]] TrackResult initialise(const sensor::RgbdFrame& frame, const Features& features);
   [[nodiscard]] TrackResult lost(const sensor::RgbdFrame& frame);
   /// Tracks from the predicted pose; none if no pose found there can be trusted.
-  [[nodiscard]] std::optional<TrackResult> track_with_motion_model(
-      const maps::Map& map, const sensor::RgbdFrame& frame, const features::FrameFeatures& features) const;
+  [[nodiscard]] std::optional<TrackResult> track_with_motion_model(const maps::Map& map,
+                                                                   const TrackedImage& image) const;
   /// Finds the pose by the image's appearance; the local map moves there.
-  [[nodiscard]] std::optional<TrackResult> relocalise(const maps::Map& map, const sensor::RgbdFrame& frame,
-                                                      const features::FrameFeatures& features);
+  [[nodiscard]] std::optional<TrackResult> relocalise(const maps::Map& map, const TrackedImage& image);
   void record(const sensor::RgbdFrame& frame, TrackResult& result);
 
   [[nodiscard]] PoseHypotheses pose_hypotheses(const maps::Map& map, const sensor::RgbdFrame& frame,
@@ -176,17 +177,15 @@ class Tracker {
   [[nodiscard]] std::vector<PlaceHypothesis> place_hypotheses(const maps::Map& map,
                                                               const features::FrameFeatures& features) const;
   /// `search_radius_px`: as FrameAligner's.
-  [[nodiscard]] TrackResult align(const maps::Map& map, const sensor::RgbdFrame& frame,
-                                  const features::FrameFeatures& features, const geometry::Rigid3& hypothesis,
-                                  double search_radius_px) const;
+  [[nodiscard]] TrackResult align(const maps::Map& map, const TrackedImage& image,
+                                  const geometry::Rigid3& hypothesis, double search_radius_px) const;
   [[nodiscard]] bool jumps(double stamp, const geometry::Rigid3& camera_from_world) const;
   [[nodiscard]] double support(const TrackResult& result) const;
   [[nodiscard]] bool passes_strict_check(const TrackResult& result,
                                          const features::FrameFeatures& features) const;
 
-  [[nodiscard]] geometry::Rigid3 depth_from_camera(const sensor::RgbdFrame& frame) const;
-  [[nodiscard]] Features synchronised(const sensor::RgbdFrame& frame, const Features& features,
-                                      const geometry::Vector6d& velocity) const;
+  /// Time from the colour image to the depth image; 0 if they are taken as of one moment.
+  [[nodiscard]] double depth_delay_s(const sensor::RgbdFrame& frame) const;
 
   TrackerOptions options_;
   sensor::Pinhole camera_;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "robots/robot_cameras.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <optional>
 #include <utility>
@@ -23,9 +25,15 @@ constexpr int kMostQuestions = 2;
 
 }  // namespace
 
-RobotCameras::RobotCameras(RobotRecordings& recordings, bool refine, const core::Executor& executor,
-                           core::Log& log)
-    : recordings_(&recordings), executor_(&executor), log_(&log), robots_(recordings.robots()) {
+RobotCameras::RobotCameras(RobotRecordings& recordings, bool refine, BeginSlam begin,
+                           const RunContext& context)
+    : recordings_(&recordings),
+      begin_(std::move(begin)),
+      services_(context.services),
+      executor_(context.executor),
+      log_(context.log),
+      choices_(recordings.robots().size()),
+      robots_(recordings.robots()) {
   // Generated recordings have no lens, and no error.
   asked_ = recordings.format() == "synth";
   refine_ = refine && !asked_;
@@ -50,6 +58,7 @@ void RobotCameras::after(std::size_t frame, const Slams& slams) {
   const bool ends_before = frame + kAnswerFrames + kUseFrames >= recordings_->size();
   if (ends_before && !recordings_->live()) return;
 
+  answered_ = true;
   question_ = std::make_unique<Question>();
   question_->cameras = cameras_;
   question_->better.resize(cameras_.size());
@@ -75,28 +84,60 @@ void RobotCameras::take_answer(std::size_t frame) {
   }
 }
 
-bool RobotCameras::before(std::size_t frame, std::size_t robot, const Slams& slams) {
+bool RobotCameras::before(std::size_t frame, std::size_t robot, Slams& slams) {
   if (question_ != nullptr && frame >= question_->due) take_answer(frame);
   if (waiting_.empty() || !waiting_[robot] || frame < use_from_) return false;
   waiting_[robot] = false;
-  use(robot, *slams[robot]);
+  use(robot, true, slams[robot]);
   return true;
 }
 
-void RobotCameras::use(std::size_t robot, mapping::Slam& slam) {
-  const auto number = static_cast<std::int32_t>(robot);
-  robots_[robot].versions.push_back({cameras_[robot].camera(), slam.map().next_keyframe_id(number).index,
-                                     static_cast<std::int32_t>(slam.frame_poses().size())});
-  const auto pictures = recordings_->taken_by(number, cameras_[robot].camera());
-  slam.recalibrate(cameras_[robot].camera(), [&](std::int64_t index) -> std::optional<sensor::RgbdFrame> {
-    if (pictures == nullptr) return std::nullopt;
-    auto frame = pictures->read(static_cast<std::size_t>(index));
-    if (!frame) return std::nullopt;
-    return std::move(*frame);
-  });
+bool RobotCameras::may_read_again(std::size_t robot, bool keyframe) {
+  const bool taken = choices_[robot].takes(keyframe);
+  const bool before = !answered_ || (!waiting_.empty() && waiting_[robot]) || question_ != nullptr;
+  return refine_ && (keyframe || (taken && before));
 }
 
-void RobotCameras::estimate_finished(const Slams& slams) {
+void RobotCameras::use(std::size_t robot, bool again, std::unique_ptr<mapping::Slam>& slam) {
+  const auto number = static_cast<std::int32_t>(robot);
+  const sensor::Camera& camera = cameras_[robot].camera();
+  robots_[robot].versions.push_back({camera, slam->map().next_keyframe_id(number).index,
+                                     static_cast<std::int32_t>(slam->frame_poses().size())});
+  const std::shared_ptr<const dataset::FrameSource> pictures = recordings_->taken_by(number, camera);
+  const auto read = [&](std::size_t index) -> std::optional<sensor::RgbdFrame> {
+    if (pictures == nullptr) return std::nullopt;
+    auto frame = pictures->read(index);
+    if (!frame) return std::nullopt;
+    return std::move(*frame);
+  };
+
+  if (again && pictures != nullptr && services_->features) {
+    mapping::SecondPass pass;
+    pass.camera = camera;
+    pass.read = [&](double stamp) -> std::optional<std::pair<sensor::RgbdFrame, mapping::Slam::Features>> {
+      const auto index = recordings_->frame_at(number, stamp);
+      auto frame = index ? read(*index) : std::nullopt;
+      if (!frame) return std::nullopt;
+      auto features = services_->features(*frame, number);
+      return std::pair(std::move(*frame), std::move(features));
+    };
+    pass.begin = [&] {
+      auto begun = begin_(robots_[robot]);
+      begun->set_camera(camera);
+      return begun;
+    };
+
+    if (auto mapped = mapping::map_again(*slam, pass, *executor_)) {
+      log_->debug(fmt::format("{}: {} frames were mapped again with the better camera", robots_[robot].name,
+                              slam->frame_poses().size()));
+      slam = std::move(mapped);
+      return;
+    }
+  }
+  slam->recalibrate(camera, [&read](std::int64_t index) { return read(static_cast<std::size_t>(index)); });
+}
+
+void RobotCameras::estimate_finished(Slams& slams) {
   if (!refine_) return;
   // A live source ended before the answer was used: it is dropped, because for a recording of that length no
   // estimate would have been made.
@@ -106,11 +147,12 @@ void RobotCameras::estimate_finished(const Slams& slams) {
   }
 
   for (std::size_t r = 0; r < slams.size(); ++r) {
-    mapping::Slam& slam = *slams[r];
-    if (!waiting_.empty() && waiting_[r]) use(r, slam);  // its last frame came before the answer was used
+    std::unique_ptr<mapping::Slam>& slam = slams[r];
+    if (!waiting_.empty() && waiting_[r])
+      use(r, true, slam);  // its last frame came before the answer was used
     for (int i = 0; i < kMostQuestions; ++i) {
-      if (!cameras_[r].ask(slam.map(), slam.frame_poses(), *executor_, *log_)) break;
-      use(r, slam);
+      if (!cameras_[r].ask(slam->map(), slam->frame_poses(), *executor_, *log_)) break;
+      use(r, !answered_ && i == 0, slam);
     }
   }
 }

@@ -4,13 +4,15 @@
 // The cameras of all robots of a run, estimated from the maps: once while they grow, beside the tracker, and
 // again when they are finished (CameraRefinement).
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <vector>
 
 #include "plumbline/core/executor.hpp"
 #include "plumbline/core/log.hpp"
-#include "plumbline/mapping/slam.hpp"
+#include "plumbline/mapping/second_pass.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
+#include "plumbline/pipeline/stage.hpp"
 #include "robots/camera_refinement.hpp"
 #include "summary/sections.hpp"
 
@@ -21,7 +23,9 @@ using Slams = std::vector<std::unique_ptr<mapping::Slam>>;  ///< by robot
 class RobotCameras {
  public:
   /// `refine`: estimate the cameras. All arguments must outlive this.
-  RobotCameras(RobotRecordings& recordings, bool refine, const core::Executor& executor, core::Log& log);
+  /// `begin`: a Slam of that robot that has seen nothing.
+  using BeginSlam = std::function<std::unique_ptr<mapping::Slam>(const RobotInfo&)>;
+  RobotCameras(RobotRecordings& recordings, bool refine, BeginSlam begin, const RunContext& context);
 
   /// The robots, with all refined versions of their cameras.
   [[nodiscard]] const std::vector<RobotInfo>& robots() const { return robots_; }
@@ -29,12 +33,14 @@ class RobotCameras {
   [[nodiscard]] std::vector<sensor::Camera> now() const;
 
   /// Called before a frame is tracked: waits for the answer when it is due, and uses it from the first frame
-  /// that is read with it. True: the robot's map was rebuilt for its camera.
-  bool before(std::size_t frame, std::size_t robot, const Slams& slams);
+  /// that is read with it. True: the robot's map was made anew for its camera.
+  bool before(std::size_t frame, std::size_t robot, Slams& slams);
   /// Called after a frame was tracked: starts the estimate from the present maps, beside the tracker, once.
   void after(std::size_t frame, const Slams& slams);
+  /// True if the second pass may need the picture of a frame that was tracked; to be called for each.
+  [[nodiscard]] bool may_read_again(std::size_t robot, bool keyframe);
   /// Estimates from the finished maps, until nothing improves any more.
-  void estimate_finished(const Slams& slams);
+  void estimate_finished(Slams& slams);
 
   /// Takes over a robot's camera from an interrupted run; resume() follows.
   void restore(const RobotInfo& stored, mapping::Slam& slam);
@@ -53,14 +59,19 @@ class RobotCameras {
   };
   [[nodiscard]] bool knows_enough(std::size_t frame, const Slams& slams) const;
   void take_answer(std::size_t frame);
-  /// Rebuilds the robot's map for its camera as it is known now.
-  void use(std::size_t robot, mapping::Slam& slam);
+  /// Makes the robot's map anew for its camera as it is known now: the recording is mapped again if it is
+  /// `again`, and can be, else the map is rebuilt.
+  void use(std::size_t robot, bool again, std::unique_ptr<mapping::Slam>& slam);
 
   RobotRecordings* recordings_;
+  BeginSlam begin_;
+  std::shared_ptr<const RunServices> services_;
   const core::Executor* executor_;
   core::Log* log_;
   bool refine_;
-  bool asked_;  ///< while mapping
+  bool asked_;                                      ///< while mapping
+  bool answered_ = false;                           ///< while mapping: what came before is not read any more
+  std::vector<mapping::SecondPassChoice> choices_;  ///< by robot
   std::vector<RobotInfo> robots_;
   std::vector<CameraRefinement> cameras_;  ///< by robot
   std::vector<CameraRefinement> given_;    ///< cameras before the estimate

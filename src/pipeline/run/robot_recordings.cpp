@@ -70,6 +70,21 @@ dataset::PairInfo RobotRecordings::info(std::size_t index) const {
   return of(at).info(at.index);
 }
 
+std::optional<std::size_t> RobotRecordings::frame_at(std::int32_t robot, double stamp) const {
+  const dataset::FrameSource& recording = *recordings_[static_cast<std::size_t>(robot)];
+  std::size_t first = 0;
+  std::size_t last = recording.size();
+  while (first < last) {
+    const std::size_t middle = first + (last - first) / 2;
+    if (recording.info(middle).stamp < stamp)
+      first = middle + 1;
+    else
+      last = middle;
+  }
+  if (first == recording.size() || recording.info(first).stamp != stamp) return std::nullopt;
+  return first;
+}
+
 std::size_t RobotRecordings::missing() const {
   std::size_t missing = 0;
   for (const auto& recording : recordings_) missing += recording->missing();

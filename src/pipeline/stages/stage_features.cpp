@@ -19,6 +19,10 @@ class FeaturesStage : public Stage {
     for (const RobotInfo& robot : recordings_->robots()) {
       extractors_.push_back(std::make_unique<features::FeatureExtractor>(options_, robot.camera.color));
     }
+    context.services->features = [this](const sensor::RgbdFrame& frame, std::int32_t robot) {
+      const features::FeatureExtractor& extractor = *extractors_[static_cast<std::size_t>(robot)];
+      return std::make_shared<const features::FrameFeatures>(extractor.extract(frame));
+    };
     return {};
   }
   core::Result<void> process(StageIo& io) override {

@@ -45,13 +45,15 @@ class TrackStage : public Stage {
 
   core::Result<void> start(const RunContext& context) override {
     context_ = &context;
-    for (const RobotInfo& robot : recordings().robots()) {
-      slams_.push_back(std::make_unique<mapping::Slam>(options_, robot.camera.color, robot.number,
-                                                       *context.executor, *context.log));
-      slams_.back()->set_camera(robot.camera);
-      if (context.hooks.feedback != nullptr) slams_.back()->use(context.hooks.feedback);
-    }
-    cameras_.emplace(*context.input.recordings, refine_, *context.executor, *context.log);
+    const auto begin = [this](const RobotInfo& robot) {
+      auto slam = std::make_unique<mapping::Slam>(options_, robot.camera.color, robot.number,
+                                                  *context_->executor, *context_->log);
+      slam->set_camera(robot.camera);
+      if (context_->hooks.feedback != nullptr) slam->use(context_->hooks.feedback);
+      return slam;
+    };
+    for (const RobotInfo& robot : recordings().robots()) slams_.push_back(begin(robot));
+    cameras_.emplace(*context.input.recordings, refine_, begin, context);
     unstored_.resize(slams_.size());
     observed_.resize(slams_.size());
     if (context.resumed != nullptr) restore(*context.resumed);
@@ -73,7 +75,6 @@ class TrackStage : public Stage {
     const mapping::FrameReport report = slam.process(*frame, features);
     if (slam.taken_back() > taken_back) unstored_[number].since = {};  // edges that are stored have changed
     note(io.frame(), robot, report);
-    if (report.keyframe.valid() && refine_) recordings().keep(io.frame());
 
     auto tracked = std::make_shared<TrackedFrame>();
     tracked->robot = robot.number;
@@ -81,7 +82,10 @@ class TrackStage : public Stage {
     tracked->stamp = report.stamp;
     tracked->depth_from_camera = report.depth_from_camera;
     tracked->row = rows_.back();
-    if (slam.frame_poses().size() > poses) tracked->pose = slam.frame_poses().back();
+    if (slam.frame_poses().size() > poses) {
+      tracked->pose = slam.frame_poses().back();
+      if (cameras_->may_read_again(number, report.keyframe.valid())) recordings().keep(io.frame());
+    }
 
     if (tracked->pose && tracked->pose->tracked) {
       tracked->frame = {robot.number, static_cast<std::int32_t>(poses)};

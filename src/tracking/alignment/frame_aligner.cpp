@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "alignment/frame_aligner.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "observable_directions.hpp"
-#include "plumbline/features/rolling_shutter.hpp"
 #include "plumbline/tracking/align_points.hpp"
 #include "plumbline/tracking/pose_terms.hpp"
 
@@ -31,25 +31,35 @@ constexpr double kLineSigma_px = 0.6;
 FrameAligner::FrameAligner(const AlignmentInput& input, const Rigid3& hypothesis, double search_radius_px)
     : in_(input),
       search_radius_px_(search_radius_px),
-      predicted_(input.motion.continuous() ? input.motion.predict(input.frame.stamp) : hypothesis),
+      predicted_(input.motion.continuous() ? input.motion.predict(input.image.frame.stamp) : hypothesis),
+      motion_(input.image.motion),
       use_motion_prior_(!input.motion.contradicted()) {
   problem_.camera = in_.camera;
   result_.camera_from_world = hypothesis;
-  result_.depth_from_camera = in_.depth_from_camera;
+  result_.depth_from_camera = motion_.depth_from_camera;
 }
 
 TrackResult FrameAligner::run() {
   if (search_radius_px_ > 0.0) {
     for (const AlignmentRound& round : kCoarse) align(round);
-    correct_rolling_shutter();
+    correct_image_motion();
   }
-  for (const AlignmentRound& round : kFine) align(round);
+  align_finely();
   if (contradicts_motion_prior()) {
     use_motion_prior_ = false;
-    for (const AlignmentRound& round : kFine) align(round);
+    align_finely();
   }
   judge();
   return std::move(result_);
+}
+
+void FrameAligner::align_finely() {
+  bool moved = false;
+  for (AlignmentRound round : kFine) {
+    round.rematch = round.rematch || moved;
+    align(round);
+    moved = round.reject_outliers && correct_image_motion();
+  }
 }
 
 void FrameAligner::align(const AlignmentRound& round) {
@@ -61,20 +71,39 @@ void FrameAligner::align(const AlignmentRound& round) {
   if (round.reject_outliers) reject_outliers();  // chi-square gates
 }
 
-/// Repeats the rolling-shutter correction: the motion model, with which it was made, lags behind a changing
-/// motion, which is now known from the rough pose.
-void FrameAligner::correct_rolling_shutter() {
+/// Synchronises the features again: the motion model, with which that was done, lags behind a changing
+/// motion, which is now known from the pose. True if that moved them.
+bool FrameAligner::correct_image_motion() {
+  constexpr double kLeast_px = 0.1;
   const double readout_s = in_.options.readout_s;
-  const double dt = in_.frame.stamp - in_.motion.last_stamp();
-  if (readout_s == 0.0 || !in_.motion.continuous() || dt < 1e-4 || dt > 0.5) return;
-  const Rigid3 step = result_.camera_from_world * in_.motion.camera_from_world().inverse();
-  const geometry::Vector6d mean = geometry::log_se3(step) / dt;
-  // Both velocities are means over their steps; extrapolate by half a step.
-  const geometry::Vector6d before = in_.motion.velocity();
-  const geometry::Vector6d change = before.isZero(0.0) ? mean : geometry::Vector6d(1.5 * (mean - before));
-  auto corrected = std::make_shared<features::FrameFeatures>(in_.features);
-  features::undo_rolling_shutter(*corrected, in_.camera, change, readout_s);
-  result_.features = std::move(corrected);
+  const double delay_s = in_.depth_delay_s;
+  if (readout_s == 0.0 && delay_s == 0.0) return false;
+
+  const Rigid3& pose = result_.camera_from_world;
+  const auto at_stamp = in_.motion.velocity_after(frame().stamp, pose, 0.0);
+  const auto until_depth = in_.motion.velocity_after(frame().stamp, pose, delay_s);
+  if (!at_stamp || !until_depth) return false;
+
+  // An error of the pose moves the late depth image further than the pose: a whole step towards each new
+  // estimate would overshoot.
+  const double ahead = std::max(0.0, delay_s) / (frame().stamp - in_.motion.last_stamp());
+  const geometry::Vector6d change =
+      (delay_s * *until_depth - geometry::log_se3(motion_.depth_from_camera)) / (1.0 + ahead);
+  const ImageMotion motion{readout_s * *at_stamp, geometry::exp_se3(change) * motion_.depth_from_camera};
+
+  constexpr double kDistance_m = 1.5;  // of what is seen
+  const geometry::Vector6d shutter_change = 0.5 * (motion.shutter - motion_.shutter);
+  const double moved_px =
+      in_.camera.fx *
+      std::max(change.head<3>().norm() / kDistance_m + change.tail<3>().norm(),
+               shutter_change.head<3>().norm() / kDistance_m + shutter_change.tail<3>().norm());
+  if (moved_px < kLeast_px) return false;
+
+  motion_ = motion;
+  result_.features = synchronised(in_.image.measured, frame().depth, in_.camera, motion_);
+  result_.depth_from_camera = motion_.depth_from_camera;
+  intensity_level_.reset();
+  return true;
 }
 
 void FrameAligner::match_landmarks(const AlignmentRound& round) {
@@ -105,9 +134,9 @@ void FrameAligner::associate_surface(const AlignmentRound& round) {
   SurfaceAssociationOptions how;
   how.max_distance_m = round.max_plane_distance_m;
   how.max_samples = round.surface_samples;
-  problem_.planes = tracking::associate_surface(in_.local_map.surface, in_.frame.depth, in_.camera,
-                                                result_.camera_from_world, in_.depth_from_camera, how,
-                                                &result_.surface_in_view);
+  problem_.planes =
+      tracking::associate_surface(in_.local_map.surface, frame().depth, in_.camera, result_.camera_from_world,
+                                  motion_.depth_from_camera, how, &result_.surface_in_view);
 }
 
 void FrameAligner::associate_intensity(const AlignmentRound& round) {
@@ -117,7 +146,7 @@ void FrameAligner::associate_intensity(const AlignmentRound& round) {
   if (!again) {
     problem_.photometric = in_.photometric.associate(
         in_.map, in_.local_map.keyframes, round.pyramid_level,
-        {features().photometric.get(), &in_.frame.depth, in_.depth_from_camera, in_.camera},
+        {features().photometric.get(), &frame().depth, motion_.depth_from_camera, in_.camera},
         result_.camera_from_world);
   }
   intensity_level_ = round.pyramid_level;
@@ -141,8 +170,7 @@ void FrameAligner::constrain_degenerate_directions() {
   if (!in_.options.motion_prior) return;
   MotionTrust trust = MotionTrust::kUnknown;
   if (use_motion_prior_ && surface_only_) trust = MotionTrust::kSurfaceOnly;
-  if (use_motion_prior_ && !surface_only_ && in_.motion.reliable(in_.frame.stamp))
-    trust = MotionTrust::kLikely;
+  if (use_motion_prior_ && !surface_only_ && in_.motion.reliable(frame().stamp)) trust = MotionTrust::kLikely;
   problem_.prior = motion_prior(result_.estimate.information, predicted_, trust);
 }
 

@@ -3,8 +3,10 @@
 
 // The pose of one frame from one hypothesis, coarse to fine (docs/method/tracking.md; the paper's
 // section 3.2).
+#include <memory>
 #include <optional>
 
+#include "alignment/image_motion.hpp"
 #include "plumbline/tracking/tracker.hpp"
 
 namespace plumbline::tracking {
@@ -17,9 +19,8 @@ struct AlignmentInput {
   const LocalMap& local_map;
   const PhotometricKeyframes& photometric;
   const MotionModel& motion;
-  const sensor::RgbdFrame& frame;
-  const features::FrameFeatures& features;
-  geometry::Rigid3 depth_from_camera;
+  const TrackedImage& image;
+  double depth_delay_s = 0.0;  ///< of the depth image after the colour image's stamp
 };
 
 struct AlignmentRound {
@@ -42,7 +43,8 @@ class FrameAligner {
 
  private:
   void align(const AlignmentRound& round);
-  void correct_rolling_shutter();
+  void align_finely();
+  bool correct_image_motion();
   void match_landmarks(const AlignmentRound& round);
   void associate_surface(const AlignmentRound& round);
   void associate_intensity(const AlignmentRound& round);
@@ -52,8 +54,9 @@ class FrameAligner {
   [[nodiscard]] bool contradicts_motion_prior();
   [[nodiscard]] geometry::Matrix6d trusted_information(bool by_features, bool by_surface);
   void judge();
+  [[nodiscard]] const sensor::RgbdFrame& frame() const { return in_.image.frame; }
   [[nodiscard]] const features::FrameFeatures& features() const {
-    return result_.features != nullptr ? *result_.features : in_.features;
+    return result_.features != nullptr ? *result_.features : *in_.image.synchronised;
   }
   [[nodiscard]] bool uses_features() const {
     return features().extracted() && (in_.options.points || in_.options.lines);
@@ -63,6 +66,7 @@ class FrameAligner {
   const AlignmentInput& in_;
   double search_radius_px_;
   geometry::Rigid3 predicted_;
+  ImageMotion motion_;  ///< with which the features were synchronised
   optimize::PoseProblem problem_;
   TrackResult result_;  ///< its camera_from_world is the estimate so far; features: where they were corrected
   std::optional<std::size_t> intensity_level_;  ///< pyramid level of problem_.photometric
