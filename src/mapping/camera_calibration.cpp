@@ -26,11 +26,11 @@ using optimize::CalibrationProblem;
 using optimize::CameraChange;
 using optimize::CameraEvidence;
 using optimize::CameraUnknown;
-using optimize::FreeUnknowns;
-using optimize::kCameraUnknowns;
 
 constexpr int kParts = 4;
-constexpr int kRounds = 3;  // of linearising where the last one led
+constexpr int kRounds = 3;        // of linearising where the last one led
+constexpr double kSame = 0.01;    // change, in standard deviations of a wrong file, that needs no other round
+constexpr double kBlock_s = 1.0;  // whose errors are taken as independent of other blocks
 constexpr std::size_t kLeastKeyframes = 8;
 constexpr int kLeastViewsInAll = 24;  // including frames: fewer show the same view again and again
 constexpr int kLeastViews = 2;
@@ -148,6 +148,7 @@ double depth_rate(const maps::MapPoint& point, const optimize::CalibrationPose& 
 /// Some neighbouring views, with all that at least two of them see.
 void add_stretch(const CalibrationRun& run, const geometry::Trajectory& path, const View* begin,
                  const View* end, CalibrationProblem& part) {
+  const int first_block = part.poses.empty() ? 0 : part.poses.back().block + 1;
   std::map<core::PointId, std::vector<CalibrationObservation>> by_point;
   for (const View* view = begin; view != end; ++view) {
     optimize::CalibrationPose pose;
@@ -156,6 +157,7 @@ void add_stretch(const CalibrationRun& run, const geometry::Trajectory& path, co
 
     // The relative poses of components are unknown: one pose of each is held.
     pose.fixed = view == begin || view->root != (view - 1)->root;
+    pose.block = first_block + static_cast<int>((view->stamp - begin->stamp) / kBlock_s);
 
     for (const auto& [id, observation] : view->seen) {
       by_point[id].push_back(observation);
@@ -187,40 +189,6 @@ void add_run(const CalibrationRun& run, int wanted, const sensor::Camera& camera
   }
 }
 
-CameraChange nothing(const sensor::Camera& camera) {
-  CameraChange change = CameraChange::Zero();
-  change[optimize::kReadout] = camera.readout_s.value_or(0.0);
-  return change;
-}
-
-/// Trial of a set of unknowns: for each part, the values found from the other parts and the cost on this
-/// part.
-struct Trial {
-  std::array<double, kParts> held_out{};  ///< costs
-  std::array<CameraChange, kParts> found;
-  [[nodiscard]] double cost() const { return std::accumulate(held_out.begin(), held_out.end(), 0.0); }
-  [[nodiscard]] CameraChange mean() const {
-    CameraChange sum = CameraChange::Zero();
-    for (const CameraChange& f : found) sum += f;
-    return sum / kParts;
-  }
-  [[nodiscard]] CameraChange sigma() const {
-    CameraChange squares = CameraChange::Zero();
-    for (const CameraChange& f : found) squares += (f - mean()).cwiseAbs2();
-    return ((kParts - 1.0) / kParts * squares).cwiseSqrt();
-  }
-};
-
-using Group = std::vector<CameraUnknown>;
-/// Groups of unknowns, the most important first; each has to explain residuals that those before it leave.
-const std::vector<Group>& groups() {
-  static const std::vector<Group> all = {
-      {optimize::kReadout},          {optimize::kDelay}, {optimize::kSlopeX},
-      {optimize::kSlopeY},           {optimize::kFocal}, {optimize::kCentreX, optimize::kCentreY},
-      {optimize::kK1, optimize::kK2}};
-  return all;
-}
-
 /// Numbers of camera.yaml that are estimated, and the unknown that each depends on.
 struct CameraNumber {
   const char* name;
@@ -240,123 +208,41 @@ std::vector<CameraNumber> numbers_of(const sensor::Camera& camera) {
           {"k2", optimize::kK2, camera.distortion[1]}};
 }
 
-class Calibrator {
- public:
-  /// True if linearising at `a` gives the same as linearising at `b`, to a thousandth of the prior's standard
-  /// deviation.
-  [[nodiscard]] bool same(const CameraChange& a, const CameraChange& b) const {
-    return ((a - b).array().abs() < 1e-3 * prior_.sigma.array()).all();
+optimize::CameraPrior prior_of(const sensor::Camera& given, const CalibrationOptions& options) {
+  optimize::CameraPrior prior;
+  prior.mean = optimize::change_between(given, options.file.value_or(given));
+  const auto set = [&prior](CameraUnknown unknown, const NumberPrior& sigma) {
+    prior.right_sigma[unknown] = sigma.right;
+    prior.wrong_sigma[unknown] = sigma.wrong;
+  };
+  set(optimize::kFocal, options.focal);
+  set(optimize::kReadout, options.readout_s);
+  set(optimize::kSlopeX, options.slope);
+  set(optimize::kSlopeY, options.slope);
+  set(optimize::kCentreX, options.centre_px);
+  set(optimize::kCentreY, options.centre_px);
+  set(optimize::kK1, options.distortion);
+  set(optimize::kK2, options.distortion);
+  set(optimize::kDelay, options.delay_s);
+  prior.wrong.fill(options.wrong);
+  return prior;
+}
+
+/// What is known of each number, in the order of numbers_of().
+std::vector<CameraFinding> findings_of(const sensor::Camera& file, const sensor::Camera& camera,
+                                       const optimize::CameraPosterior& known) {
+  std::vector<CameraFinding> findings;
+  const std::vector<CameraNumber> found = numbers_of(camera);
+  for (const CameraNumber& n : numbers_of(file)) {
+    const auto u = static_cast<Eigen::Index>(n.unknown);
+    CameraFinding f{n.name, n.value, found[findings.size()].value};
+    f.sigma = (n.unknown == optimize::kFocal ? n.value : 1.0) * std::sqrt(known.covariance(u, u));
+    f.wrong = known.wrong[optimize::group_of(n.unknown)];
+    f.used = std::abs(f.found - f.given) > f.sigma;
+    findings.push_back(f);
   }
-
-  Calibrator(const sensor::Camera& given, const CalibrationOptions& options)
-      : given_(given), options_(options), none_(nothing(given)) {
-    prior_.mean = none_;
-    prior_.sigma = CameraChange{{options.focal_prior, options.readout_prior_s, options.slope_prior,
-                                 options.slope_prior, options.centre_prior_px, options.centre_prior_px,
-                                 options.distortion_prior, options.distortion_prior, options.delay_prior_s}};
-  }
-
-  /// Chooses the unknowns to change from the evidence of each part. An unknown that another one hides (a
-  /// wrong distortion hides a wrong focal length) shows when it is tried again after the other one was found.
-  CameraChange choose(const std::vector<CameraEvidence>& evidence, CameraCalibration& result) const {
-    const Trial before = try_out(evidence, {});
-    const Group earlier = used_earlier();
-    FreeUnknowns believed{};
-    for (const CameraUnknown u : earlier) believed[u] = true;
-    Trial best = earlier.empty() ? before : try_out(evidence, believed);
-    bool news = !earlier.empty() && is_believed(before, best, earlier, options_.earlier_least_gain);
-    result.findings.clear();
-
-    for (const CameraNumber& n : numbers_of(given_)) result.findings.push_back({n.name, n.value, n.value});
-    std::size_t in_vain = 0;  // tried since something was believed
-    for (std::size_t g = 0; in_vain < groups().size(); g = (g + 1) % groups().size()) {
-      ++in_vain;
-      const Group& group = groups()[g];
-      if (believed[group.front()]) continue;
-
-      FreeUnknowns free = believed;
-      for (const CameraUnknown u : group) free[u] = true;
-      const Trial trial = try_out(evidence, free);
-      const bool used = is_believed(best, trial, group, options_.least_gain);
-      const CameraChange found = most_likely(evidence, free, prior_);
-      const double gain = (best.cost() - trial.cost()) / before.cost();
-      note(group, found, trial.sigma(), gain, used, result.findings);
-      if (!used) continue;
-
-      believed = free;
-      best = trial;
-      news = true;
-      in_vain = 0;
-    }
-
-    if (!news) {
-      believed = {};
-      best = before;
-    }
-
-    result.gain = 1.0 - best.cost() / before.cost();
-    const CameraChange change = most_likely(evidence, believed, prior_);
-    for (const Group& group : groups()) {  // report the final values of all
-      if (believed[group.front()]) note(group, change, best.sigma(), {}, true, result.findings);
-    }
-
-    return change;
-  }
-
- private:
-  /// Unknowns that were changed for the map from which this one was rebuilt. A change that hides behind one
-  /// of them (a distortion that was found with a wrong focal length) shows only if that one may change, too.
-  [[nodiscard]] Group used_earlier() const {
-    Group all;
-    for (const CameraNumber& n : numbers_of(given_)) {
-      const auto was_used = [&](const CameraFinding& f) { return f.used && f.name == n.name; };
-      if (std::any_of(options_.earlier.begin(), options_.earlier.end(), was_used)) all.push_back(n.unknown);
-    }
-    return all;
-  }
-  [[nodiscard]] Trial try_out(const std::vector<CameraEvidence>& evidence, const FreeUnknowns& free) const {
-    Trial trial;
-    for (std::size_t i = 0; i < kParts; ++i) {
-      std::vector<CameraEvidence> others = evidence;
-      others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
-      trial.found[i] = most_likely(others, free, prior_);
-      trial.held_out[i] = evidence[i].cost_of(trial.found[i]);
-    }
-    return trial;
-  }
-
-  [[nodiscard]] bool is_believed(const Trial& before, const Trial& with, const Group& group,
-                                 double least_gain) const {
-    int better = 0;
-    for (std::size_t i = 0; i < kParts; ++i) better += with.held_out[i] < before.held_out[i] ? 1 : 0;
-    if (better < kParts - 1 || !(with.cost() < (1.0 - least_gain) * before.cost())) return false;
-    if (group.front() == optimize::kReadout && with.mean()[optimize::kReadout] < 0.0)
-      return false;  // no camera reads a picture before it is taken
-    return std::any_of(group.begin(), group.end(), [&](CameraUnknown u) {
-      return std::abs(with.mean()[u] - none_[u]) > options_.least_sigmas * with.sigma()[u];
-    });
-  }
-
-  /// Records the estimates of a group; without `gain` the earlier gain is kept.
-  void note(const Group& group, const CameraChange& change, const CameraChange& sigma,
-            std::optional<double> gain, bool used, std::vector<CameraFinding>& findings) const {
-    const std::vector<CameraNumber> found = numbers_of(optimize::changed_camera(given_, change));
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      const CameraUnknown u = found[i].unknown;
-      CameraFinding& f = findings[i];
-      if (std::find(group.begin(), group.end(), u) == group.end()) continue;
-      f.found = found[i].value;
-      f.sigma = (u == optimize::kFocal ? f.given : 1.0) * sigma[u];
-      f.gain = gain.value_or(f.gain);
-      f.used = used;
-    }
-  }
-
-  const sensor::Camera& given_;
-  const CalibrationOptions& options_;
-  CameraChange none_;
-  optimize::CameraPrior prior_;
-};
+  return findings;
+}
 
 /// Evidence of each part; none if some part has none.
 std::optional<std::vector<CameraEvidence>> evidence_of(Parts& parts, const CameraChange& change,
@@ -390,8 +276,10 @@ core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRu
     result.observations += static_cast<int>(part.observations.size());
   }
 
-  const Calibrator calibrator(given, options);
-  CameraChange change = nothing(given);
+  const optimize::CameraPrior prior = prior_of(given, options);
+  const CameraChange none = optimize::change_between(given, given);
+  CameraChange change = none;
+  optimize::CameraPosterior known;
 
   for (int round = 0; round < kRounds; ++round) {
     const auto evidence = evidence_of(parts, change, executor);
@@ -403,11 +291,22 @@ core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRu
                       result.views, result.observations));
     }
 
-    const CameraChange before = std::exchange(change, calibrator.choose(*evidence, result));
-    if (calibrator.same(before, change)) break;
+    known = optimize::camera_posterior(*evidence, prior);
+    double before = 0.0, after = 0.0;
+    for (const CameraEvidence& e : *evidence) {
+      before += e.cost_of(prior.mean);
+      after += e.cost_of(known.mean);
+    }
+    result.gain = 1.0 - after / before;
+
+    const CameraChange step =
+        (known.mean - std::exchange(change, known.mean)).cwiseQuotient(prior.wrong_sigma);
+    if (step.cwiseAbs().maxCoeff() < kSame) break;
   }
 
   result.camera = optimize::changed_camera(given, change);
+  result.findings = findings_of(options.file.value_or(given), result.camera, known);
+  result.news = (change - none).cwiseAbs().cwiseQuotient(known.covariance.diagonal().cwiseSqrt()).maxCoeff();
   return result;
 }
 
@@ -416,7 +315,7 @@ std::vector<CameraFinding> findings_between(const sensor::Camera& given, const s
   const std::vector<CameraNumber> after = numbers_of(found);
   for (const CameraNumber& n : numbers_of(given)) {
     const double value = after[findings.size()].value;
-    findings.push_back({n.name, n.value, value, 0.0, 0.0, value != n.value});
+    findings.push_back({n.name, n.value, value, 0.0, value != n.value ? 1.0 : 0.0, value != n.value});
   }
   return findings;
 }

@@ -7,6 +7,7 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <utility>
 
 #include "ceres_solve.hpp"
@@ -237,9 +238,9 @@ std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, Came
 
   CameraEvidence evidence;
   evidence.at = Eigen::Map<const CameraChange>(unknowns.change());
-  std::vector<double> gradient;
+  std::vector<double> residuals;
   ceres::CRSMatrix crs;
-  if (!ceres_problem.Evaluate(order, &evidence.cost, nullptr, &gradient, &crs)) return std::nullopt;
+  if (!ceres_problem.Evaluate(order, &evidence.cost, &residuals, nullptr, &crs)) return std::nullopt;
 
   const Eigen::SparseMatrix<double> jacobian = Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(
       crs.num_rows, crs.num_cols, static_cast<int>(crs.values.size()), crs.rows.data(), crs.cols.data(),
@@ -254,13 +255,28 @@ std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, Came
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);
   if (factor.info() != Eigen::Success) return std::nullopt;
 
-  const Eigen::MatrixXd coupling = by_others.transpose() * by_camera;
-  const Eigen::MatrixXd answered = factor.solve(coupling);
-  const Eigen::Map<const Eigen::VectorXd> all(gradient.data(), crs.num_cols);
-  evidence.information = by_camera.transpose() * by_camera - coupling.transpose() * answered;
-  evidence.gradient = all.head<kCamera>() - answered.transpose() * all.tail(others);
-  if (!evidence.information.allFinite() || !evidence.gradient.allFinite()) return std::nullopt;
+  // What is left of each row's derivative by the camera when poses and points follow it.
+  const Eigen::MatrixXd answered = factor.solve(Eigen::MatrixXd(by_others.transpose() * by_camera));
+  const Eigen::MatrixXd alone = by_camera - by_others * answered;
+  if (!alone.allFinite()) return std::nullopt;
 
+  std::map<int, EvidenceBlock> blocks;
+  Eigen::Index row = 0;
+  for (const CalibrationObservation& o : problem.observations) {
+    const Eigen::Index rows = o.depth > 0.0 ? 3 : 2;
+    const auto derivative = alone.middleRows(row, rows);
+    const Eigen::Map<const Eigen::VectorXd> residual(residuals.data() + row, rows);
+    EvidenceBlock& block = blocks[problem.poses[static_cast<std::size_t>(o.pose)].block];
+    block.gradient += derivative.transpose() * residual;
+    block.information += derivative.transpose() * derivative;
+    row += rows;
+  }
+
+  for (const auto& [number, block] : blocks) {
+    evidence.all.gradient += block.gradient;
+    evidence.all.information += block.information;
+    evidence.blocks.push_back(block);
+  }
   return evidence;
 }
 
@@ -281,9 +297,23 @@ sensor::Camera changed_camera(const sensor::Camera& given, const CameraChange& c
   return camera;
 }
 
+CameraChange change_between(const sensor::Camera& given, const sensor::Camera& camera) {
+  CameraChange change;
+  change[kFocal] = camera.color.fx / given.color.fx - 1.0;
+  change[kReadout] = camera.readout_s.value_or(0.0);
+  change[kSlopeX] = camera.depth_slope[0] - given.depth_slope[0];
+  change[kSlopeY] = camera.depth_slope[1] - given.depth_slope[1];
+  change[kCentreX] = camera.color.cx - given.color.cx;
+  change[kCentreY] = camera.color.cy - given.color.cy;
+  change[kK1] = camera.distortion[0] - given.distortion[0];
+  change[kK2] = camera.distortion[1] - given.distortion[1];
+  change[kDelay] = camera.depth_delay_s - given.depth_delay_s;
+  return change;
+}
+
 double CameraEvidence::cost_of(const CameraChange& change) const {
   const CameraChange d = change - at;
-  return cost + gradient.dot(d) + 0.5 * d.dot(information * d);
+  return cost + all.gradient.dot(d) + 0.5 * d.dot(all.information * d);
 }
 
 std::optional<CameraEvidence> camera_evidence(CalibrationProblem& problem, const CameraChange& change) {
@@ -308,25 +338,6 @@ std::optional<CameraEvidence> camera_evidence(CalibrationProblem& problem, const
   for (std::size_t i = 0; i < problem.points.size(); ++i)
     problem.points[i] = Eigen::Map<const Eigen::Vector3d>(unknowns.point(static_cast<int>(i)));
   return evidence;
-}
-
-CameraChange most_likely(const std::vector<CameraEvidence>& evidence, const FreeUnknowns& free,
-                         const CameraPrior& prior) {
-  Eigen::Matrix<double, kCameraUnknowns, kCameraUnknowns> information =
-      prior.sigma.array().square().inverse().matrix().asDiagonal();
-  CameraChange gradient = CameraChange::Zero();  // at the prior's mean
-  for (const CameraEvidence& e : evidence) {
-    information += e.information;
-    gradient += e.gradient + e.information * (prior.mean - e.at);
-  }
-  for (int i = 0; i < static_cast<int>(kCameraUnknowns); ++i) {
-    if (free[static_cast<std::size_t>(i)]) continue;
-    information.row(i).setZero();
-    information.col(i).setZero();
-    information(i, i) = 1.0;
-    gradient(i) = 0.0;
-  }
-  return prior.mean - information.ldlt().solve(gradient);
 }
 
 }  // namespace plumbline::optimize

@@ -13,7 +13,7 @@ using geometry::Matrix6d;
 using geometry::Rigid3;
 using geometry::Vector6d;
 
-struct NormalEquations {
+struct PoseEquations {
   Matrix6d h = Matrix6d::Zero();  ///< lower triangle of the sum over terms
   Vector6d g = Vector6d::Zero();
   double cost = 0.0;
@@ -63,7 +63,7 @@ struct RowSums {
     for (int a = 0; a < 6; ++a) g[a] += (w * row[a]) * r;
   }
 
-  void move_to(NormalEquations& n) const {
+  void move_to(PoseEquations& n) const {
     for (int a = 0; a < 6; ++a) {
       for (int b = 0; b <= a; ++b) n.h(a, b) = h[a][b];
       n.g(a) = g[a];
@@ -129,8 +129,8 @@ void add_planes(const PoseProblem& problem, const Rigid3& pose, const PoseSolver
   }
 }
 
-NormalEquations evaluate(const PoseProblem& problem, const Rigid3& pose, const PoseSolverOptions& options) {
-  NormalEquations n;
+PoseEquations evaluate(const PoseProblem& problem, const Rigid3& pose, const PoseSolverOptions& options) {
+  PoseEquations n;
   RowSums sums;
   add_points(problem, pose, options, sums, n.cost);
   add_lines(problem, pose, options, sums, n.cost);
@@ -148,7 +148,7 @@ NormalEquations evaluate(const PoseProblem& problem, const Rigid3& pose, const P
 
 /// Adds the prior's cost; the derivative of log(Exp(xi) T M^-1) by xi is taken as identity (small
 /// differences).
-void add_prior(const PoseProblem& problem, const Rigid3& pose, NormalEquations& n) {
+void add_prior(const PoseProblem& problem, const Rigid3& pose, PoseEquations& n) {
   if (!problem.prior) return;
   const Vector6d e = geometry::log_se3(pose * problem.prior->camera_from_world.inverse());
   const Vector6d g = problem.prior->information * e;
@@ -204,7 +204,7 @@ PoseSummary solve_pose(const PoseProblem& problem, const Rigid3& camera_from_wor
                        const PoseSolverOptions& options) {
   PoseSummary summary;
   Rigid3 pose = camera_from_world;
-  NormalEquations n = evaluate(problem, pose, options);
+  PoseEquations n = evaluate(problem, pose, options);
   summary.information = n.h;
   add_prior(problem, pose, n);
   summary.initial_cost = n.cost;
@@ -217,7 +217,7 @@ PoseSummary solve_pose(const PoseProblem& problem, const Rigid3& camera_from_wor
     if (!step.allFinite()) break;
 
     const Rigid3 trial = geometry::exp_se3(step) * pose;
-    NormalEquations at_trial = evaluate(problem, trial, options);
+    PoseEquations at_trial = evaluate(problem, trial, options);
     const Matrix6d information = at_trial.h;
     add_prior(problem, trial, at_trial);
     summary.converged = step.cwiseAbs().maxCoeff() < options.min_step;

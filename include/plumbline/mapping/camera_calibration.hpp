@@ -4,6 +4,7 @@
 // The camera from its own recordings: what focal length, readout, depth slope, depth delay, centre and
 // distortion explain best what the keyframes of finished maps saw. A value is used only if it also
 // explains parts of the runs that it was not estimated from.
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,34 +27,42 @@ struct CalibrationRun {
 
 /// One number of the camera.
 struct CameraFinding {
-  std::string name;  ///< key in camera.yaml
-  double given = 0.0;
+  std::string name;    ///< key in camera.yaml
+  double given = 0.0;  ///< by the camera's file
   double found = 0.0;
-  double sigma = 0.0;  ///< standard deviation by leaving parts of the runs out, one at a time (jackknife)
-  double gain = 0.0;   ///< relative reduction of the cost on held-out parts
-  bool used = false;   ///< it is in `camera`
+  double sigma = 0.0;  ///< standard deviation of `found`
+  double wrong = 0.0;  ///< probability that the file is wrong here, 0 to 1
+  bool used = false;   ///< the camera differs from the file here by more than a standard deviation
+};
+
+/// Prior of the camera's numbers: `right` is the standard deviation where the file is right, `wrong` where it
+/// is not.
+struct NumberPrior {
+  double right;
+  double wrong;
 };
 
 struct CalibrationOptions {
-  int views = 200;            ///< keyframes and frames between them of all runs, at most
-  double least_gain = 0.002;  ///< smallest relative reduction of the cost on held-out parts
-  double least_sigmas = 3.0;  ///< smallest difference from the given value, in standard deviations
-  double focal_prior = 0.02;  ///< standard deviation of the given focal length, share
-  double centre_prior_px = 10.0;
-  double readout_prior_s = 0.02;
-  double slope_prior = 0.02;      ///< 1/m
-  double distortion_prior = 0.1;  ///< of k1 and of k2
-  double delay_prior_s = 0.02;
-  std::vector<CameraFinding> earlier;  ///< of a map made with another camera: first all are tried together
-  double earlier_least_gain = 0.002;   ///< like least_gain, for those together
+  int views = 200;  ///< keyframes and frames between them of all runs, at most
+  /// The camera as its file has it, which the prior is about; none: the one that the maps were made with.
+  std::optional<sensor::Camera> file;
+  NumberPrior focal{0.001, 0.02};  ///< share
+  NumberPrior centre_px{1.0, 10.0};
+  NumberPrior distortion{0.003, 0.1};  ///< of k1 and of k2
+  NumberPrior slope{0.001, 0.02};      ///< 1/m
+  NumberPrior delay_s{0.001, 0.02};
+  NumberPrior readout_s{0.0002, 0.02};
+  double wrong = 0.3;  ///< probability that a group of numbers is wrong, before anything is seen
 };
 
 struct CameraCalibration {
-  sensor::Camera camera;  ///< the given one with the accepted changes
+  sensor::Camera camera;
   std::vector<CameraFinding> findings;
   int views = 0;
   int observations = 0;
-  double gain = 0.0;  ///< relative reduction of the cost on held-out parts by all together
+  double gain = 0.0;  ///< relative reduction of the cost against the file
+  /// Largest difference of a number from the camera that the maps were made with, in standard deviations.
+  double news = 0.0;
 };
 
 /// `given`: the camera that the runs' features were read with. The same for any number of threads. Errors

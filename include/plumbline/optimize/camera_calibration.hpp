@@ -29,13 +29,26 @@ enum CameraUnknown : std::size_t {
   kCameraUnknowns
 };
 using CameraChange = Eigen::Matrix<double, kCameraUnknowns, 1>;
-using FreeUnknowns = std::array<bool, kCameraUnknowns>;
+using CameraCovariance = Eigen::Matrix<double, kCameraUnknowns, kCameraUnknowns>;
+
+/// Numbers of a camera's file that are right or wrong together.
+enum CameraGroup : std::size_t {
+  kFocalGroup,
+  kCentreGroup,
+  kLensGroup,  ///< k1 and k2
+  kSlopeGroup,
+  kDelayGroup,
+  kReadoutGroup,
+  kCameraGroups
+};
+CameraGroup group_of(CameraUnknown unknown);
 
 struct CalibrationPose {
   geometry::Rigid3 camera_from_world;  ///< when the middle row was read
   /// (m/s, rad/s): camera_from_world(t + dt) = Exp(velocity dt) camera_from_world(t).
   geometry::Vector6d velocity = geometry::Vector6d::Zero();
   bool fixed = false;
+  int block = 0;  ///< a second or so of the recording, whose errors are taken as independent of other seconds
 };
 
 /// Pose `pose` sees point `point` at `pixel` of the image as the lens shows it, not undistorted.
@@ -57,33 +70,50 @@ struct CalibrationProblem {
   std::vector<CalibrationObservation> observations;
 };
 
+/// A quadratic function of the change: gradient and second derivative at CameraEvidence::at.
+struct EvidenceBlock {
+  CameraChange gradient = CameraChange::Zero();
+  CameraCovariance information = CameraCovariance::Zero();
+};
+
 /// Evidence of a problem about its camera, with poses and points at their optimum: half the squared standard
 /// deviations, a quadratic function of the change.
 struct CameraEvidence {
   CameraChange at = CameraChange::Zero();  ///< point of linearisation
   double cost = 0.0;                       ///< there
-  CameraChange gradient = CameraChange::Zero();
-  Eigen::Matrix<double, kCameraUnknowns, kCameraUnknowns> information =
-      Eigen::Matrix<double, kCameraUnknowns, kCameraUnknowns>::Zero();
+  EvidenceBlock all;
+  std::vector<EvidenceBlock> blocks;  ///< parts that add up to it, by CalibrationPose::block
 
   [[nodiscard]] double cost_of(const CameraChange& change) const;
 };
 
+/// Each group of the file's numbers is right, to `right_sigma`, or wrong, by `wrong_sigma`.
 struct CameraPrior {
+  CameraChange mean = CameraChange::Zero();         ///< the file
+  CameraChange right_sigma = CameraChange::Ones();  ///< > 0
+  CameraChange wrong_sigma = CameraChange::Ones();  ///< > 0
+  std::array<double, kCameraGroups> wrong{};        ///< probability, 0 to 1
+};
+
+/// What is known of a camera: mean and covariance of a mixture over which groups of the file are wrong.
+struct CameraPosterior {
   CameraChange mean = CameraChange::Zero();
-  CameraChange sigma = CameraChange::Ones();  ///< > 0
+  CameraCovariance covariance = CameraCovariance::Zero();
+  std::array<double, kCameraGroups> wrong{};  ///< probability that the file is
 };
 
 /// The given camera, changed.
 sensor::Camera changed_camera(const sensor::Camera& given, const CameraChange& change);
+/// The change that makes `camera` of `given`; both have the same ratio of fx to fy.
+CameraChange change_between(const sensor::Camera& given, const sensor::Camera& camera);
 
 /// The evidence of a problem around the camera that `change` makes of the given one, poses (those that are
 /// not fixed) and points being adjusted to that: the problem has them afterwards, so that the next question
 /// begins there. None: it could not be solved.
 std::optional<CameraEvidence> camera_evidence(CalibrationProblem& problem, const CameraChange& change);
 
-/// Most likely change given all evidence and the prior. Unknowns that are not free have the prior's mean.
-CameraChange most_likely(const std::vector<CameraEvidence>& evidence, const FreeUnknowns& free,
-                         const CameraPrior& prior);
+/// The camera given all evidence and the prior. The covariance of the evidence is taken from the scatter of
+/// its blocks (docs/method/calibration.md). The readout is never negative.
+CameraPosterior camera_posterior(const std::vector<CameraEvidence>& evidence, const CameraPrior& prior);
 
 }  // namespace plumbline::optimize

@@ -118,12 +118,12 @@ class Mapped {
 
 void print_calibration(const mapping::CameraCalibration& calibration) {
   print("{} views, {} observations of points\n", calibration.views, calibration.observations);
-  print("{:<14} {:>10} {:>10} {:>9} {:>7}\n", "", "given", "found", "+-", "gain");
+  print("{:<14} {:>10} {:>10} {:>9} {:>7}\n", "", "given", "found", "+-", "wrong");
   for (const mapping::CameraFinding& f : calibration.findings) {
     print("{:<14} {:>10.5g} {:>10.5g} {:>9.2g} {:>6.1f}% {}\n", f.name, f.given, f.found, f.sigma,
-          100.0 * f.gain, f.used ? "used" : "not used");
+          100.0 * f.wrong, f.used ? "used" : "not used");
   }
-  print("held-out parts of the recordings fit {:.1f} % better with this camera\n", 100.0 * calibration.gain);
+  print("the recordings fit {:.1f} % better with this camera\n", 100.0 * calibration.gain);
 }
 
 /// Reports a problem with the output before anything is read.

@@ -11,6 +11,7 @@
 namespace plumbline::pipeline {
 namespace {
 
+constexpr double kNews = 1.0;                // standard deviations for which a map is made anew
 constexpr double kGuessedFocalSigma = 0.01;  // a guess is confirmed when its focal length is known so well
 
 const char* unit_of(const std::string& name) {
@@ -40,18 +41,6 @@ std::string doubt_of(const core::Result<mapping::CameraCalibration>& found) {
                      kGuessedFocalSigma * fx->given);
 }
 
-/// Keeps the findings of earlier estimates; all are reported relative to the camera that was given at first.
-void keep_earlier(const std::vector<mapping::CameraFinding>& earlier,
-                  std::vector<mapping::CameraFinding>& findings) {
-  for (std::size_t i = 0; i < earlier.size(); ++i) {
-    mapping::CameraFinding& f = findings[i];
-    if (!f.used && earlier[i].used) f.found = f.given;
-    if (earlier[i].used) f.gain = earlier[i].gain;
-    f.used = f.used || earlier[i].used;
-    f.given = earlier[i].given;
-  }
-}
-
 }  // namespace
 
 Json section_of(const CameraReport& camera) {
@@ -61,7 +50,7 @@ Json section_of(const CameraReport& camera) {
                        {"given", f.given},
                        {"found", f.found},
                        {"sigma", f.sigma},
-                       {"gain", rounded(f.gain)},
+                       {"wrong", rounded(f.wrong)},
                        {"used", f.used}});
   }
   return {{"robot", camera.robot}, {"gain", rounded(camera.gain)},    {"numbers", numbers},
@@ -76,10 +65,10 @@ CameraRefinement::CameraRefinement(const RobotInfo& robot) : robot_(robot), came
 bool CameraRefinement::ask(const maps::Map& map, const std::vector<maps::FramePose>& frames,
                            const core::Executor& executor, core::Log& log) {
   mapping::CalibrationOptions options;
-  options.earlier = report_.findings;
+  options.file = robot_.camera;
   if (robot_.camera.guess) {
-    options.focal_prior = 0.1;
-    options.centre_prior_px = 20.0;
+    options.focal = {0.1, 0.1};
+    options.centre_px = {20.0, 20.0};
   }
 
   const auto found =
@@ -94,24 +83,22 @@ bool CameraRefinement::ask(const maps::Map& map, const std::vector<maps::FramePo
   }
 
   for (const mapping::CameraFinding& f : found->findings)
-    log.debug(fmt::format("{}: {} of {} views: given {:.5g}, found {:.5g} +- {:.2g}, gain {:.2f} %, {}",
-                          robot_.name, f.name, found->views, f.given, f.found, f.sigma, 100.0 * f.gain,
-                          f.used ? "used" : "not used"));
+    log.debug(fmt::format("{}: {} of {} views: given {:.5g}, found {:.5g} +- {:.2g}, wrong with {:.2f}",
+                          robot_.name, f.name, found->views, f.given, f.found, f.sigma, f.wrong));
   report_.note.clear();
-  const bool better = !found_text(found->findings).empty();
-  if (!better && report_.asked > 1) return false;
-
-  std::vector<mapping::CameraFinding> findings = found->findings;
-  keep_earlier(options.earlier, findings);
-  report_.findings = std::move(findings);
-  report_.gain = 1.0 - (1.0 - report_.gain) * (1.0 - found->gain);
-  if (!better) return false;
+  const bool better = found->news >= kNews;
+  if (report_.asked > 1 && !better) return false;
+  report_.findings = found->findings;
+  report_.gain = found->gain;
+  if (!better) {
+    for (mapping::CameraFinding& f : report_.findings) f.used = false;
+    return false;
+  }
 
   camera_ = found->camera;
   camera_.guess = false;
-  log.info(
-      fmt::format("{}: the camera is better with {}: held-out parts of the recording fit {:.1f} % better",
-                  robot_.name, found_text(report_.findings), 100.0 * report_.gain));
+  log.info(fmt::format("{}: the camera is better with {}: the recording fits {:.1f} % better", robot_.name,
+                       found_text(report_.findings), 100.0 * report_.gain));
   return true;
 }
 
