@@ -19,11 +19,11 @@ constexpr double kSofter = 1e-4;     // information, in units of wrong_sigma, of
 CameraChange model_sigma() {
   CameraChange sigma;
   sigma[kFocal] = 0.001;
-  sigma[kReadout] = 0.0005;
+  sigma[kReadout] = 0.0003;
   sigma[kSlopeX] = sigma[kSlopeY] = 0.0005;
-  sigma[kCentreX] = sigma[kCentreY] = 0.5;
-  sigma[kK1] = sigma[kK2] = 0.003;
-  sigma[kDelay] = 0.0005;
+  sigma[kCentreX] = sigma[kCentreY] = 0.7;
+  sigma[kK1] = sigma[kK2] = 0.0015;
+  sigma[kDelay] = 0.0008;
   return sigma;
 }
 

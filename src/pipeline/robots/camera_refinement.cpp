@@ -11,7 +11,10 @@
 namespace plumbline::pipeline {
 namespace {
 
-constexpr double kNews = 1.0;                // standard deviations for which a map is made anew
+// Change of a number, in standard deviations, for which a map is made anew: a file that seems right is left
+// alone; once it is known to be wrong, smaller changes follow.
+constexpr double kFirstNews = 2.5;
+constexpr double kLaterNews = 1.0;
 constexpr double kGuessedFocalSigma = 0.01;  // a guess is confirmed when its focal length is known so well
 
 const char* unit_of(const std::string& name) {
@@ -86,7 +89,7 @@ bool CameraRefinement::ask(const maps::Map& map, const std::vector<maps::FramePo
     log.debug(fmt::format("{}: {} of {} views: given {:.5g}, found {:.5g} +- {:.2g}, wrong with {:.2f}",
                           robot_.name, f.name, found->views, f.given, f.found, f.sigma, f.wrong));
   report_.note.clear();
-  const bool better = found->news >= kNews;
+  const bool better = found->news >= (changed_ ? kLaterNews : kFirstNews);
   if (report_.asked > 1 && !better) return false;
   report_.findings = found->findings;
   report_.gain = found->gain;
@@ -95,6 +98,7 @@ bool CameraRefinement::ask(const maps::Map& map, const std::vector<maps::FramePo
     return false;
   }
 
+  changed_ = true;
   camera_ = found->camera;
   camera_.guess = false;
   log.info(fmt::format("{}: the camera is better with {}: the recording fits {:.1f} % better", robot_.name,
@@ -104,6 +108,7 @@ bool CameraRefinement::ask(const maps::Map& map, const std::vector<maps::FramePo
 
 void CameraRefinement::restore(const sensor::Camera& camera, std::size_t from_frame) {
   camera_ = camera;
+  changed_ = true;
   report_.findings = mapping::findings_between(robot_.camera, camera);
   report_.from_frame = from_frame;
   report_.note = "found before the run was interrupted";

@@ -49,6 +49,7 @@ class CameraRefinement {
  private:
   RobotInfo robot_;
   sensor::Camera camera_;
+  bool changed_ = false;  ///< it is not the file's any more
   CameraReport report_;
 };
 

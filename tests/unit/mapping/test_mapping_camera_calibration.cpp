@@ -111,7 +111,7 @@ TEST(CalibrateCamera, FindsReadoutSlopeAndFocalLength) {
   truth.depth_slope = {0.02, 0.0};
   truth.color.fx *= 1.02;
   truth.color.fy *= 1.02;
-  const auto found = calibrate(swing(truth, 20, 90));
+  const auto found = calibrate(swing(truth, 80, 150));
   ASSERT_TRUE(found) << found.error().message;
   EXPECT_TRUE(finding(*found, "readout").used);
   EXPECT_TRUE(finding(*found, "depth_slope x").used);
@@ -121,7 +121,9 @@ TEST(CalibrateCamera, FindsReadoutSlopeAndFocalLength) {
   EXPECT_NEAR(found->camera.color.fx, truth.color.fx, 2.5);
   EXPECT_NEAR(found->camera.color.fy, truth.color.fy, 2.5);
   EXPECT_GT(found->gain, 0.2);
-  EXPECT_EQ(found->camera.color.cx, 319.5);
+  EXPECT_NEAR(found->camera.color.cx, 319.5, 1.0);
+  EXPECT_GT(finding(*found, "fx").wrong, 0.9);
+  EXPECT_LT(finding(*found, "cx").wrong, 0.3);
 }
 
 TEST(CalibrateCamera, FindsThatDepthCameLate) {
@@ -132,40 +134,37 @@ TEST(CalibrateCamera, FindsThatDepthCameLate) {
   EXPECT_TRUE(finding(*found, "depth_delay").used);
   EXPECT_NEAR(found->camera.depth_delay_s, 0.02, 0.006);
   for (const CameraFinding& f : found->findings) {
-    EXPECT_EQ(f.used, f.name == "depth_delay")
-        << f.name << " " << f.found << " +- " << f.sigma << " " << f.gain;
+    if (f.name == "depth_delay") continue;
+    EXPECT_LT(f.wrong, 0.3) << f.name << " " << f.found << " +- " << f.sigma;
   }
 }
 
 TEST(CalibrateCamera, LeavesACameraThatFitsAlone) {
   const auto found = calibrate(swing(given_camera(), 20, 90));
   ASSERT_TRUE(found) << found.error().message;
-  for (const CameraFinding& f : found->findings) EXPECT_FALSE(f.used) << f.name << " " << f.found;
-  EXPECT_EQ(sensor::to_yaml(found->camera), sensor::to_yaml(given_camera()));
+  EXPECT_LT(found->news, 2.0);
+  for (const CameraFinding& f : found->findings) {
+    EXPECT_LT(f.wrong, 0.3) << f.name << " " << f.found << " +- " << f.sigma;
+    EXPECT_LT(std::abs(f.found - f.given), 2.0 * f.sigma) << f.name << " " << f.found;
+  }
 }
 
-TEST(CalibrateCamera, WhatWasFoundEarlierIsLookedForTogether) {
-  sensor::Camera truth = given_camera();
-  truth.readout_s = 0.02;
-  truth.color.fx *= 1.01;
-  truth.color.fy *= 1.01;
-  const World world = swing(truth, 20, 90);
+// A map that was made with a better camera is asked about the file all the same: what was found before is no
+// evidence of its own.
+TEST(CalibrateCamera, EveryQuestionStartsFromTheFile) {
+  const World world = swing(given_camera(), 80, 150);
   CalibrationOptions options;
-  options.least_gain = 0.03;
-  const auto alone = calibrate(world, 1, options);
-  ASSERT_TRUE(alone) << alone.error().message;
-  EXPECT_TRUE(finding(*alone, "readout").used);
-  EXPECT_FALSE(finding(*alone, "fx").used);
-  options.earlier = alone->findings;
-  for (CameraFinding& f : options.earlier) f.used = f.used || f.name == "fx" || f.name == "fy";
-  const auto together = calibrate(world, 1, options);
-  ASSERT_TRUE(together) << together.error().message;
-  EXPECT_NEAR(*together->camera.readout_s, 0.02, 0.002);
-  EXPECT_NEAR(together->camera.color.fx, truth.color.fx, 1.0);
-  // A camera that fits stays as it is, whatever was found earlier.
-  const auto right = calibrate(swing(given_camera(), 20, 90), 1, options);
-  ASSERT_TRUE(right) << right.error().message;
-  EXPECT_EQ(sensor::to_yaml(right->camera), sensor::to_yaml(given_camera()));
+  options.file = given_camera();
+  options.file->color.fx *= 1.02;
+  options.file->color.fy *= 1.02;
+  options.file->readout_s = 0.02;
+  const auto found = calibrate(world, 1, options);
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_EQ(finding(*found, "fx").given, options.file->color.fx);
+  EXPECT_GT(finding(*found, "fx").wrong, 0.9);
+  EXPECT_GT(finding(*found, "readout").wrong, 0.9);
+  EXPECT_NEAR(found->camera.color.fx, given_camera().color.fx, 2.0);
+  EXPECT_NEAR(*found->camera.readout_s, 0.0, 0.002);
 }
 
 TEST(CalibrateCamera, SameForAnyNumberOfThreads) {
