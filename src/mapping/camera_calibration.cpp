@@ -208,24 +208,36 @@ std::vector<CameraNumber> numbers_of(const sensor::Camera& camera) {
           {"k2", optimize::kK2, camera.distortion[1]}};
 }
 
+/// The options', but where the file tells a standard deviation that one.
 optimize::CameraPrior prior_of(const sensor::Camera& given, const CalibrationOptions& options) {
   optimize::CameraPrior prior;
-  prior.mean = optimize::change_between(given, options.file.value_or(given));
-  const auto set = [&prior](CameraUnknown unknown, const NumberPrior& sigma) {
-    prior.right_sigma[unknown] = sigma.right;
+  const sensor::Camera& file = options.file ? *options.file : given;
+  prior.mean = optimize::change_between(given, file);
+  const auto set = [&prior](CameraUnknown unknown, const NumberPrior& sigma, double told) {
+    prior.right_sigma[unknown] = told > 0.0 ? std::min(told, sigma.wrong) : sigma.right;
     prior.wrong_sigma[unknown] = sigma.wrong;
   };
-  set(optimize::kFocal, options.focal);
-  set(optimize::kReadout, options.readout_s);
-  set(optimize::kSlopeX, options.slope);
-  set(optimize::kSlopeY, options.slope);
-  set(optimize::kCentreX, options.centre_px);
-  set(optimize::kCentreY, options.centre_px);
-  set(optimize::kK1, options.distortion);
-  set(optimize::kK2, options.distortion);
-  set(optimize::kDelay, options.delay_s);
+  set(optimize::kFocal, options.focal, file.sigma.fx / file.color.fx);
+  set(optimize::kReadout, options.readout_s, file.sigma.readout_s);
+  set(optimize::kSlopeX, options.slope, file.sigma.depth_slope);
+  set(optimize::kSlopeY, options.slope, file.sigma.depth_slope);
+  set(optimize::kCentreX, options.centre_px, file.sigma.centre);
+  set(optimize::kCentreY, options.centre_px, file.sigma.centre);
+  set(optimize::kK1, options.distortion, file.sigma.distortion);
+  set(optimize::kK2, options.distortion, file.sigma.distortion);
+  set(optimize::kDelay, options.delay_s, file.sigma.depth_delay_s);
   prior.wrong.fill(options.wrong);
   return prior;
+}
+
+sensor::CameraSigma sigma_of(const optimize::CameraPosterior& known, const sensor::Camera& camera) {
+  const CameraChange sigma = known.covariance.diagonal().cwiseSqrt();
+  return {camera.color.fx * sigma[optimize::kFocal],
+          std::max(sigma[optimize::kCentreX], sigma[optimize::kCentreY]),
+          std::max(sigma[optimize::kK1], sigma[optimize::kK2]),
+          sigma[optimize::kReadout],
+          std::max(sigma[optimize::kSlopeX], sigma[optimize::kSlopeY]),
+          sigma[optimize::kDelay]};
 }
 
 /// What is known of each number, in the order of numbers_of().
@@ -305,6 +317,7 @@ core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRu
   }
 
   result.camera = optimize::changed_camera(given, change);
+  result.sigma = sigma_of(known, result.camera);
   result.findings = findings_of(options.file.value_or(given), result.camera, known);
   result.news = (change - none).cwiseAbs().cwiseQuotient(known.covariance.diagonal().cwiseSqrt()).maxCoeff();
   return result;

@@ -194,6 +194,40 @@ const char* model_name(LensModel model) {
   return model == LensModel::kEquidistant ? "equidistant" : "pinhole";
 }
 
+/// The keys of CameraSigma, in the order of the file.
+std::vector<std::pair<const char*, double*>> sigma_keys(CameraSigma& sigma) {
+  return {{"fx", &sigma.fx},
+          {"centre", &sigma.centre},
+          {"distortion", &sigma.distortion},
+          {"readout", &sigma.readout_s},
+          {"depth_slope", &sigma.depth_slope},
+          {"depth_delay", &sigma.depth_delay_s}};
+}
+
+void read_sigma(const ConfigNode& root, CameraSigma& sigma, ConfigProblems& problems) {
+  const ConfigNode* node = root.find("sigma");
+  if (node == nullptr) return;
+  if (node->kind != ConfigNode::Kind::kMap) {
+    problems.push_back(
+        {node->mark, "sigma", "must hold standard deviations, such as {fx: 0.8, readout: 0.5 ms}"});
+    return;
+  }
+  core::OptionTable table;
+  for (const auto& [key, value] : sigma_keys(sigma)) {
+    const bool seconds = value == &sigma.readout_s || value == &sigma.depth_delay_s;
+    table.number(key, *value, {0.0, 1e3}, seconds ? "s" : "", "Standard deviation; 0: not known");
+  }
+  table.set_all(*node, "sigma", problems);
+}
+
+std::string sigma_yaml(CameraSigma sigma) {
+  std::vector<std::string> told;
+  for (const auto& [key, value] : sigma_keys(sigma)) {
+    if (*value > 0.0) told.push_back(fmt::format("{}: {}", key, *value));
+  }
+  return told.empty() ? "" : fmt::format("sigma: {{{}}}  # standard deviations\n", fmt::join(told, ", "));
+}
+
 core::Result<Camera> camera_in(core::Result<ConfigNode> root, const std::filesystem::path& file) {
   if (!root) return tl::unexpected(root.error());
 
@@ -222,7 +256,8 @@ core::Result<Camera> camera_in(core::Result<ConfigNode> root, const std::filesys
                 "Slope along x and y: added to 1 / depth on the ray (x, y, 1)");
   table.number("depth_delay", camera.depth_delay_s, {-0.1, 0.1}, "s",
                "Delay of depth images after their stamps");
-  if (root->kind == ConfigNode::Kind::kMap) table.set_all(*root, "", problems, {"color_from_depth", "depth"});
+  if (root->kind == ConfigNode::Kind::kMap)
+    table.set_all(*root, "", problems, {"color_from_depth", "depth", "sigma"});
 
   check_pinhole(*root, camera.color, "", problems);
   const Lens color_lens = lens.lens(*root, "", problems);
@@ -231,6 +266,7 @@ core::Result<Camera> camera_in(core::Result<ConfigNode> root, const std::filesys
   if (root->find("readout") != nullptr) camera.readout_s = readout_s;
   if (slope.size() == camera.depth_slope.size()) std::copy_n(slope.begin(), 2, camera.depth_slope.begin());
   read_depth_camera(*root, camera, problems);
+  read_sigma(*root, camera.sigma, problems);
 
   if (!problems.empty()) return tl::unexpected(core::to_error(problems));
   if (camera.name.empty()) camera.name = file.stem().string();
@@ -267,6 +303,7 @@ std::string to_yaml(const Camera& camera) {
     text += fmt::format("depth_delay: {}  # s that depth images were taken later than their stamps say\n",
                         camera.depth_delay_s);
   }
+  text += sigma_yaml(camera.sigma);
 
   if (camera.color_from_depth && camera.depth) {
     const Eigen::Matrix4d m = camera.color_from_depth->isometry().matrix();

@@ -57,6 +57,7 @@ struct CalibrationOptions {
 
 struct CameraCalibration {
   sensor::Camera camera;
+  sensor::CameraSigma sigma;  ///< its standard deviations
   std::vector<CameraFinding> findings;
   int views = 0;
   int observations = 0;

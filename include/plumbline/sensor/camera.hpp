@@ -42,6 +42,16 @@ struct Pinhole {
   }
 };
 
+/// Standard deviations that a camera file tells of its own numbers; 0: not told.
+struct CameraSigma {
+  double fx = 0.0;             ///< px, of fx; fy's is in proportion
+  double centre = 0.0;         ///< px, of cx and of cy
+  double distortion = 0.0;     ///< of k1 and of k2
+  double readout_s = 0.0;      ///< seconds
+  double depth_slope = 0.0;    ///< 1/m
+  double depth_delay_s = 0.0;  ///< seconds
+};
+
 struct Camera {
   std::string name;
   Pinhole color;
@@ -60,14 +70,16 @@ struct Camera {
   /// thinks.
   std::array<double, 2> depth_slope{};
   double depth_delay_s = 0.0;  ///< delay of depth images after their stamps
-  bool guess = false;          ///< typical values, not read from a file
+  CameraSigma sigma;
+  bool guess = false;  ///< typical values, not read from a file
 
   [[nodiscard]] Lens lens() const { return {model, distortion}; }
   [[nodiscard]] bool distorted() const { return lens().distorts(); }
 };
 
 /// Reads our own camera file (camera.yaml: model width height fx fy cx cy distortion depth_scale fps readout
-/// depth_slope depth_delay [color_from_depth, depth: {width height fx fy cx cy model distortion}]). All
+/// depth_slope depth_delay [color_from_depth, depth: {width height fx fy cx cy model distortion}] [sigma: {fx
+/// centre distortion readout depth_slope depth_delay}]). All
 /// problems are reported together with file:line:column (kUsage).
 core::Result<Camera> read_camera(const std::filesystem::path& file);
 /// The same of the file's text; `file_name` is for messages.

@@ -166,7 +166,9 @@ core::Result<void> calibrate(const CalibrateRequest& request, Session& session) 
   if (!any && !session.quiet) print("the given camera fits; nothing better was found\n");
 
   if (request.output.empty()) return {};
-  const std::string yaml = "# found by plumbline calibrate\n" + sensor::to_yaml(calibration->camera);
+  sensor::Camera camera = calibration->camera;
+  camera.sigma = calibration->sigma;
+  const std::string yaml = "# found by plumbline calibrate\n" + sensor::to_yaml(camera);
   if (auto written = core::write_file(request.output, yaml); !written) return written;
   if (!session.quiet) print("written        {}\n", request.output.string());
   return {};

@@ -49,6 +49,7 @@ class CameraRefinement {
  private:
   RobotInfo robot_;
   sensor::Camera camera_;
+  int views_ = 0;         ///< most views of a question so far
   bool changed_ = false;  ///< it is not the file's any more
   CameraReport report_;
 };

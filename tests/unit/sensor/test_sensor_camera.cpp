@@ -105,6 +105,21 @@ TEST_F(CameraFile, EmptyFileIsAnError) {
   EXPECT_THAT(error_of("- 1\n- 2\n"), HasSubstr("camera.yaml:1"));
 }
 
+TEST_F(CameraFile, TellsItsOwnErrors) {
+  const auto read = parse_camera(std::string(kGood) + "sigma: {fx: 0.8, readout: 0.5 ms}\n", "camera.yaml");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->sigma.fx, 0.8);
+  EXPECT_EQ(read->sigma.readout_s, 0.0005);
+  EXPECT_EQ(read->sigma.centre, 0.0);
+  const auto again = parse_camera(to_yaml(*read), "again.yaml");
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->sigma.fx, 0.8);
+  EXPECT_EQ(again->sigma.readout_s, 0.0005);
+  EXPECT_THAT(error_of(std::string(kGood) + "sigma: {fz: 1}\n"), HasSubstr("sigma.fz"));
+  EXPECT_THAT(error_of(std::string(kGood) + "sigma: 1\n"), HasSubstr("standard deviations"));
+  EXPECT_THAT(error_of(std::string(kGood) + "sigma: {fx: -1}\n"), HasSubstr("fx"));
+}
+
 TEST_F(CameraFile, UnknownKeyGetsASuggestion) {
   EXPECT_THAT(error_of(std::string(kGood) + "depth_scal: 5\n"),
               AllOf(HasSubstr("camera.yaml:11"), HasSubstr("did you mean depth_scale")));
