@@ -37,6 +37,10 @@ struct SynthOptions {
   /// to those of the scene. Kinds: whiteout, lampoff, blur (value px, default 8), drop, cover, spin (value
   /// turns, default 1: pure rotation on the spot), nodepth. Example: "whiteout@3+1,blur@6+0.5*12".
   std::string events;
+  /// The recording's camera file is wrong: a seed, from which errors are drawn, or differences from the
+  /// truth, "fx=1.5%,cx=3,k1=0.03,slope=0.02,readout=10ms,delay=15ms"; "": it is right. Pictures do not
+  /// change.
+  std::string camera_error;
 
   void declare(core::OptionTable& table);
 };

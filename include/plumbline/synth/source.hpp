@@ -35,10 +35,18 @@ class SynthSource final : public dataset::FrameSource {
 
   [[nodiscard]] const std::string& name() const override;
   [[nodiscard]] const std::string& format() const override;
+  /// As the recording's file describes it (SynthOptions::camera_error).
   [[nodiscard]] const sensor::Camera& camera() const override;
+  [[nodiscard]] const sensor::Camera& true_camera() const;
   [[nodiscard]] std::size_t size() const override;
   [[nodiscard]] dataset::PairInfo info(std::size_t index) const override;
+  /// With the time at which depth really was taken.
+  [[nodiscard]] dataset::PairInfo true_info(std::size_t index) const;
   [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override;
+  /// As the sensors give them, not rectified.
+  [[nodiscard]] core::Result<dataset::StoredPair> stored(std::size_t index) const override;
+  /// Null if the camera's file is right.
+  [[nodiscard]] std::unique_ptr<dataset::FrameSource> taken_by(const sensor::Camera& better) const override;
   /// Exact poses at the colour stamps, in the frame of the scene file.
   [[nodiscard]] std::optional<geometry::Trajectory> truth() const override;
 

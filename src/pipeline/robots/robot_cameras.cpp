@@ -26,8 +26,8 @@ constexpr int kMostQuestions = 2;
 RobotCameras::RobotCameras(RobotRecordings& recordings, bool refine, const core::Executor& executor,
                            core::Log& log)
     : recordings_(&recordings), executor_(&executor), log_(&log), robots_(recordings.robots()) {
-  // Generated recordings have no lens, and no error.
-  asked_ = recordings.format() == "synth";
+  // Generated recordings have no lens, and no error but on request.
+  asked_ = recordings.format() == "synth" && recordings.taken_by(0, recordings.robot(0).camera) == nullptr;
   refine_ = refine && !asked_;
   for (const RobotInfo& robot : robots_) cameras_.emplace_back(robot);
 }

@@ -28,20 +28,18 @@ std::string depth_name(const dataset::PairInfo& info) {
 
 /// With the stamps that the files have.
 dataset::PairInfo labelled(const SynthSource& source, std::size_t index) {
-  dataset::PairInfo info = source.info(index);
-  info.depth_stamp -= source.camera().depth_delay_s;
+  dataset::PairInfo info = source.true_info(index);
+  info.depth_stamp -= source.true_camera().depth_delay_s;
   return info;
 }
 
 /// Writes one pair; "" or what went wrong.
 std::string write_pair(const SynthSource& source, std::size_t index, const fs::path& folder) {
-  const auto frame = source.read(index);
-  if (!frame) return frame.error().message;
+  const auto pair = source.stored(index);
+  if (!pair) return pair.error().message;
   const dataset::PairInfo info = labelled(source, index);
-  cv::Mat raw;
-  frame->depth.convertTo(raw, CV_16U, source.camera().depth_scale);
-  auto written = dataset::write_png(folder / color_name(info), frame->color);
-  if (written) written = dataset::write_png(folder / depth_name(info), raw);
+  auto written = dataset::write_png(folder / color_name(info), pair->color.pixels);
+  if (written) written = dataset::write_png(folder / depth_name(info), pair->depth.pixels);
   return written ? "" : written.error().message;
 }
 
@@ -57,7 +55,7 @@ Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs
     pairs += fmt::format("{:.6f} {} {:.6f} {}\n", info.stamp, color_name(info), info.depth_stamp,
                          depth_name(info));
     truth.push_back({info.stamp, source.world_from_camera(info.stamp)});
-    const double depth_taken = source.info(i).depth_stamp;
+    const double depth_taken = source.true_info(i).depth_stamp;
     if (depth_taken != info.stamp) truth.push_back({depth_taken, source.world_from_camera(depth_taken)});
   }
 
@@ -106,13 +104,24 @@ Result<std::size_t> write_frames(const Job& job, const core::Executor& executor,
   return done;
 }
 
+nlohmann::json describe_camera(const sensor::Camera& c) {
+  return {{"fx", c.color.fx},
+          {"fy", c.color.fy},
+          {"cx", c.color.cx},
+          {"cy", c.color.cy},
+          {"distortion", std::vector<double>(c.distortion.begin(), c.distortion.begin() + 5)},
+          {"depth_slope", c.depth_slope},
+          {"readout", c.readout_s.value_or(0.0)},
+          {"depth_delay", c.depth_delay_s}};
+}
+
 nlohmann::json describe_robot(const SynthSource& source, const std::string& folder,
-                              const std::string& path_name, std::size_t frames) {
+                              const std::string& path_name, std::size_t frames, const SynthOptions& options) {
   const auto first = source.info(0), last = source.info(source.size() - 1);
   const geometry::Rigid3 start = source.world_from_camera(first.stamp);
   const Eigen::Quaterniond q = start.quaternion();
   const Eigen::Vector3d& t = start.translation;
-  return {
+  nlohmann::json json = {
       {"folder", folder},
       {"path", path_name},
       {"frames", frames},
@@ -120,6 +129,11 @@ nlohmann::json describe_robot(const SynthSource& source, const std::string& fold
       {"first_stamp", first.stamp},
       {"last_stamp", last.stamp},
       {"start", {{"position_m", {t.x(), t.y(), t.z()}}, {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}}}};
+  if (!options.camera_error.empty()) {
+    json["camera"] = {{"file", describe_camera(source.camera())},
+                      {"true", describe_camera(source.true_camera())}};
+  }
+  return json;
 }
 
 nlohmann::json describe_options(const SynthOptions& o) {
@@ -147,6 +161,7 @@ nlohmann::json describe_options(const Scene& scene, const SynthOptions& options)
     json["layout"] = options.layout;
     json["path"] = to_string(options.path);
   }
+  if (!options.camera_error.empty()) json["camera_error"] = options.camera_error;
   return json;
 }
 
@@ -190,7 +205,7 @@ Result<std::vector<std::unique_ptr<SynthSource>>> open_all(const std::shared_ptr
 
 /// Writes the recording of each robot; returns their entries in scene.json.
 Result<nlohmann::json> write_robots(const std::vector<std::unique_ptr<SynthSource>>& sources,
-                                    const Scene& scene, const fs::path& output,
+                                    const Scene& scene, const SynthOptions& options, const fs::path& output,
                                     const core::Executor& executor, const core::StopToken& stop,
                                     const Progress& progress, WriteSummary& summary) {
   summary.robots = static_cast<int>(sources.size());
@@ -204,10 +219,15 @@ Result<nlohmann::json> write_robots(const std::vector<std::unique_ptr<SynthSourc
     const auto written =
         write_frames({*sources[i], output / folder, summary.frames, all_frames}, executor, stop, progress);
     if (!written) return tl::unexpected<core::Error>(written.error());
+    if (!options.camera_error.empty()) {
+      const std::string truth = sensor::to_yaml(sources[i]->true_camera());
+      if (auto ok = core::write_file(output / folder / "camera.true.yaml", truth); !ok)
+        return tl::unexpected<core::Error>(ok.error());
+    }
     summary.frames += *written;
     summary.path_m += sources[i]->path_length();
     robots.push_back(
-        describe_robot(*sources[i], folder, scene.robots[i % scene.robots.size()].name, *written));
+        describe_robot(*sources[i], folder, scene.robots[i % scene.robots.size()].name, *written, options));
   }
 
   summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -268,7 +288,7 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
   if (auto ok = core::make_folder(output); !ok) return fail(ok.error());
 
   WriteSummary summary;
-  const auto robots = write_robots(*sources, scene, output, executor, stop, progress, summary);
+  const auto robots = write_robots(*sources, scene, options, output, executor, stop, progress, summary);
   if (!robots) return fail(robots.error());
   summary.reference_spacing_m =
       options.reference_spacing > 0.0 ? options.reference_spacing : default_spacing(scene);

@@ -7,9 +7,11 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "plumbline/sensor/rectify.hpp"
 #include "render/depth_sensor.hpp"
 #include "render/path.hpp"
 #include "render/render.hpp"
+#include "scene/camera_error.hpp"
 #include "scene/random.hpp"
 
 namespace plumbline::synth {
@@ -77,9 +79,12 @@ struct SynthSource::Impl {
   int robot = 0;
   std::string name;
   std::string format = "synth";
-  sensor::Camera camera;
+  sensor::Camera camera;                               ///< the true one
+  sensor::Camera told;                                 ///< of the recording's file
+  sensor::Pinhole images;                              ///< of rectified pictures
+  std::shared_ptr<const sensor::Rectifier> rectifier;  ///< by `told`; null: pictures are rectified
   std::uint64_t seed = 0;
-  std::unique_ptr<CameraPath> path;
+  std::shared_ptr<const CameraPath> path;
   std::vector<Stamps> frames;
   NoiseTiles tiles;
   std::vector<float> gains;  ///< automatic exposure, every kGainStep frames
@@ -254,6 +259,11 @@ core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_p
   impl->camera = make_camera(o.sensor, o.width, o.height, o.fps);
   impl->camera.readout_s = o.readout_s;
   impl->camera.depth_delay_s = o.depth_delay_s;
+  auto told = told_camera(o, robot, impl->camera);
+  if (!told) return tl::unexpected<core::Error>(told.error());
+  impl->told = std::move(*told);
+  impl->images = impl->told.color;
+  if (!o.camera_error.empty()) impl->rectifier = std::make_shared<const sensor::Rectifier>(impl->told);
   impl->seed = mix(static_cast<std::uint64_t>(o.seed), static_cast<std::uint64_t>(robot) + 1);
 
   CameraPath::Options motion;
@@ -265,7 +275,7 @@ core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_p
   const auto lap = static_cast<std::size_t>(robot) / paths;
   motion.start_share = 0.381966 * static_cast<double>(lap);
   motion.events = world->events;
-  impl->path = std::make_unique<CameraPath>(way, motion);
+  impl->path = std::make_shared<const CameraPath>(way, motion);
 
   const std::size_t frames = o.frames > 0 ? static_cast<std::size_t>(o.frames)
                                           : static_cast<std::size_t>(impl->path->duration() * o.fps) + 1;
@@ -302,39 +312,64 @@ core::Result<void> check_paths(const Scene& scene, const SynthOptions& options) 
 
 const std::string& SynthSource::name() const { return impl_->name; }
 const std::string& SynthSource::format() const { return impl_->format; }
-const sensor::Camera& SynthSource::camera() const { return impl_->camera; }
+const sensor::Camera& SynthSource::camera() const { return impl_->told; }
+const sensor::Camera& SynthSource::true_camera() const { return impl_->camera; }
 std::size_t SynthSource::size() const { return impl_->frames.size(); }
 
-dataset::PairInfo SynthSource::info(std::size_t index) const {
+dataset::PairInfo SynthSource::true_info(std::size_t index) const {
   const Stamps& at = impl_->frames.at(index);
   return {at.color, at.depth, "", ""};
 }
 
-core::Result<sensor::RgbdFrame> SynthSource::read(std::size_t index) const {
+dataset::PairInfo SynthSource::info(std::size_t index) const {
+  dataset::PairInfo info = true_info(index);
+  info.depth_stamp += impl_->told.depth_delay_s - impl_->camera.depth_delay_s;
+  return info;
+}
+
+std::unique_ptr<dataset::FrameSource> SynthSource::taken_by(const sensor::Camera& better) const {
+  if (!impl_->rectifier) return nullptr;
+  auto impl = std::make_unique<Impl>(*impl_);
+  impl->rectifier = std::make_shared<const sensor::Rectifier>(better, impl_->images);
+  impl->told = better;
+  return std::unique_ptr<FrameSource>(new SynthSource(std::move(impl)));
+}
+
+core::Result<dataset::StoredPair> SynthSource::stored(std::size_t index) const {
   if (index >= impl_->frames.size()) {
     return core::input_error(fmt::format("{}: frame {} of {}", impl_->name, index, impl_->frames.size()));
   }
 
   const Stamps& at = impl_->frames[index];
-  sensor::RgbdFrame frame;
-  frame.index = static_cast<std::int64_t>(index);
-  frame.stamp = at.color;
-  frame.depth_stamp = at.depth;
-
-  const cv::Mat3b color = impl_->color(at);
-  frame.color = color;
-  cv::cvtColor(frame.color, frame.gray, cv::COLOR_BGR2GRAY);
-
-  cv::Mat1w raw;
+  dataset::StoredPair pair;
+  pair.color.pixels = impl_->color(at);
   if (blind(index)) {
-    raw = cv::Mat1w::zeros(color.size());
+    pair.depth.pixels = cv::Mat1w::zeros(pair.color.pixels.size());
   } else {
     const View view = look(*impl_->world, impl_->camera.color, impl_->pose(at.depth), at.depth - kFirstStamp);
-    raw = measure_depth(*impl_->world, view, impl_->world->options.sensor, impl_->tiles,
-                        {impl_->seed, at.number});
+    pair.depth.pixels = measure_depth(*impl_->world, view, impl_->world->options.sensor, impl_->tiles,
+                                      {impl_->seed, at.number});
   }
+  return pair;
+}
 
-  raw.convertTo(frame.depth, CV_32F, 1.0 / impl_->camera.depth_scale);
+core::Result<sensor::RgbdFrame> SynthSource::read(std::size_t index) const {
+  const auto pair = stored(index);
+  if (!pair) return tl::unexpected<core::Error>(pair.error());
+  const sensor::Rectifier* rectifier = impl_->rectifier.get();
+  const dataset::PairInfo at = info(index);
+  sensor::RgbdFrame frame;
+  frame.index = static_cast<std::int64_t>(index);
+  frame.stamp = at.stamp;
+  frame.depth_stamp = at.depth_stamp;
+
+  frame.color = rectifier ? rectifier->color(pair->color.pixels) : pair->color.pixels;
+  cv::cvtColor(frame.color, frame.gray, cv::COLOR_BGR2GRAY);
+  if (rectifier) {
+    frame.depth = rectifier->depth(pair->depth.pixels);
+  } else {
+    pair->depth.pixels.convertTo(frame.depth, CV_32F, 1.0 / impl_->camera.depth_scale);
+  }
   return frame;
 }
 

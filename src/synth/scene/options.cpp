@@ -7,6 +7,7 @@
 
 #include "plumbline/core/config.hpp"
 #include "plumbline/core/numbers.hpp"
+#include "scene/camera_error.hpp"
 
 namespace plumbline::synth {
 
@@ -57,6 +58,10 @@ void SynthOptions::declare(core::OptionTable& table) {
   table.text("events", events,
              "Difficult moments, kind@start+duration[*value] in seconds, separated by commas; kinds: "
              "whiteout, lampoff, blur (value px), drop, cover, spin (value turns), nodepth");
+  table.text("camera_error", camera_error,
+             "Errors of the recording's camera file: a seed that draws some, or differences from the truth, "
+             "such as fx=1.5%,cx=3,k1=0.03,slope=0.02,readout=10ms,delay=15ms (also fy, cy, k2, p1, p2, k3, "
+             "slope_y)");
 }
 
 namespace {
@@ -144,6 +149,8 @@ core::Result<void> check(const SynthOptions& options) {
   if (!(options.fps > 0.0) || !(options.speed > 0.0))
     return core::usage_error("fps, speed: must be positive");
   if (auto events = parse_events(options.events); !events) return tl::unexpected<core::Error>(events.error());
+  if (auto error = camera_error(options.camera_error, 0, options.width); !error)
+    return tl::unexpected<core::Error>(error.error());
   return {};
 }
 
