@@ -41,6 +41,7 @@ struct SynthOptions {
   /// truth, "fx=1.5%,cx=3,k1=0.03,slope=0.02,readout=10ms,delay=15ms"; "": it is right. Pictures do not
   /// change.
   std::string camera_error;
+  bool moving_masks = false;  ///< write moving/: pictures of what moves
 
   void declare(core::OptionTable& table);
 };
@@ -67,5 +68,6 @@ const char* to_string(Texture texture);
 const char* to_string(Sensor sensor);
 const char* to_string(Motion motion);
 const char* to_string(Route route);
+const char* to_string(EventKind kind);
 
 }  // namespace plumbline::synth

@@ -26,6 +26,13 @@ struct ExactFrame {
   cv::Mat face;   ///< CV_32SC1, index into Scene::faces, beyond them: a walker's, -1 = nothing hit
 };
 
+/// Motion of the camera at one moment.
+struct PathMotion {
+  Eigen::Vector3d velocity;      ///< m/s, world
+  Eigen::Vector3d acceleration;  ///< m/s^2, world, without gravity
+  Eigen::Vector3d turn_rate;     ///< rad/s, in the camera's frame
+};
+
 class SynthSource final : public dataset::FrameSource {
  public:
   /// Robot `robot` (from 0) of the scene. Errors: no frames, path through a solid (names the segment and the
@@ -52,6 +59,14 @@ class SynthSource final : public dataset::FrameSource {
 
   /// Exact pose at any time between first and last stamp (clamped to them).
   [[nodiscard]] geometry::Rigid3 world_from_camera(double stamp) const;
+  /// At any time; outside of the recording the path goes on.
+  [[nodiscard]] PathMotion motion(double stamp) const;
+  /// Time of the first frame without jitter, from which events count.
+  [[nodiscard]] double start() const;
+  [[nodiscard]] const std::vector<Event>& events() const;
+  /// CV_8UC1, 255 where the colour picture shows something that moves; empty if the world has nothing that
+  /// does.
+  [[nodiscard]] cv::Mat1b moving(std::size_t index) const;
   [[nodiscard]] ExactFrame exact(std::size_t index) const;
   /// True if an event blinds the depth sensor in this frame (covered camera, no depth).
   [[nodiscard]] bool blind(std::size_t index) const;

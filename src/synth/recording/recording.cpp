@@ -13,6 +13,7 @@
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "recording/plan_file.hpp"
 #include "recording/reference.hpp"
+#include "recording/truth_files.hpp"
 
 namespace plumbline::synth {
 
@@ -33,13 +34,20 @@ dataset::PairInfo labelled(const SynthSource& source, std::size_t index) {
   return info;
 }
 
-/// Writes one pair; "" or what went wrong.
-std::string write_pair(const SynthSource& source, std::size_t index, const fs::path& folder) {
+/// Writes one pair; "" or what went wrong. `moving`: share of the colour picture; its mask is written if
+/// asked.
+std::string write_pair(const SynthSource& source, std::size_t index, const fs::path& folder, bool mask,
+                       double& moving) {
   const auto pair = source.stored(index);
   if (!pair) return pair.error().message;
   const dataset::PairInfo info = labelled(source, index);
   auto written = dataset::write_png(folder / color_name(info), pair->color.pixels);
   if (written) written = dataset::write_png(folder / depth_name(info), pair->depth.pixels);
+
+  cv::Mat1b moves = source.moving(index);
+  moving = moves.empty() ? 0.0 : cv::countNonZero(moves) / static_cast<double>(moves.total());
+  if (mask && moves.empty()) moves = cv::Mat1b::zeros(pair->color.pixels.size());
+  if (mask && written) written = dataset::write_png(folder / "moving" / color_name(info).substr(4), moves);
   return written ? "" : written.error().message;
 }
 
@@ -75,23 +83,27 @@ struct Job {
   fs::path folder;
   std::size_t done_before;  ///< frames of the robots before
   std::size_t all_frames;
+  bool masks;
 };
 
 /// Returns the number of frames written; smaller than the total if stopped.
 Result<std::size_t> write_frames(const Job& job, const core::Executor& executor, const core::StopToken& stop,
                                  const Progress& progress) {
-  for (const char* sub : {"rgb", "depth"}) {
+  for (const char* sub : {"rgb", "depth", "moving"}) {
+    if (!job.masks && sub == std::string("moving")) continue;
     if (auto ok = core::make_folder(job.folder / sub); !ok) return tl::unexpected<core::Error>(ok.error());
   }
 
   const std::size_t batch = static_cast<std::size_t>(executor.threads()) * 4;
   std::size_t done = 0;
+  std::vector<double> moving(job.source.size());
 
   while (done < job.source.size() && !stop.stop_requested()) {
     const std::size_t count = std::min(batch, job.source.size() - done);
     std::vector<std::string> problems(count);
-    executor.parallel_for(count,
-                          [&](std::size_t i) { problems[i] = write_pair(job.source, done + i, job.folder); });
+    executor.parallel_for(count, [&](std::size_t i) {
+      problems[i] = write_pair(job.source, done + i, job.folder, job.masks, moving[done + i]);
+    });
     for (const std::string& problem : problems) {
       if (!problem.empty()) return core::output_error(problem);
     }
@@ -99,8 +111,12 @@ Result<std::size_t> write_frames(const Job& job, const core::Executor& executor,
     if (progress) progress(job.done_before + done, job.all_frames);
   }
 
-  if (auto ok = write_lists(job.source, done, job.folder); !ok)
-    return tl::unexpected<core::Error>(ok.error());
+  moving.resize(done);
+  auto ok = write_lists(job.source, done, job.folder);
+  if (ok) ok = core::write_file(job.folder / "truth.csv", describe_truth(job.source, moving));
+  if (ok && !job.source.events().empty())
+    ok = core::write_file(job.folder / "events.csv", describe_events(job.source));
+  if (!ok) return tl::unexpected<core::Error>(ok.error());
   return done;
 }
 
@@ -154,14 +170,24 @@ nlohmann::json describe_options(const SynthOptions& o) {
           {"events", o.events}};
 }
 
-/// With the options that only worlds made from a number have.
+/// With the options that not all worlds have.
 nlohmann::json describe_options(const Scene& scene, const SynthOptions& options) {
   nlohmann::json json = describe_options(options);
   if (scene.plan) {
     json["layout"] = options.layout;
     json["path"] = to_string(options.path);
   }
-  if (!options.camera_error.empty()) json["camera_error"] = options.camera_error;
+
+  // Newer options are there only if they are used.
+  SynthOptions given = options, usual;
+  core::OptionTable table, defaults;
+  given.declare(table);
+  usual.declare(defaults);
+  for (const core::OptionSpec& spec : table.specs()) {
+    if (json.contains(spec.key) || table.value(spec.key) == defaults.value(spec.key)) continue;
+    const auto value = core::parse_yaml(table.value(spec.key), "");
+    if (value) json[spec.key] = value->scalar;
+  }
   return json;
 }
 
@@ -217,7 +243,8 @@ Result<nlohmann::json> write_robots(const std::vector<std::unique_ptr<SynthSourc
   for (std::size_t i = 0; i < sources.size() && !stop.stop_requested(); ++i) {
     const std::string folder = folder_name(static_cast<int>(i));
     const auto written =
-        write_frames({*sources[i], output / folder, summary.frames, all_frames}, executor, stop, progress);
+        write_frames({*sources[i], output / folder, summary.frames, all_frames, options.moving_masks},
+                     executor, stop, progress);
     if (!written) return tl::unexpected<core::Error>(written.error());
     if (!options.camera_error.empty()) {
       const std::string truth = sensor::to_yaml(sources[i]->true_camera());

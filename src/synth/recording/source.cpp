@@ -385,6 +385,27 @@ Rigid3 SynthSource::world_from_camera(double stamp) const {
                                 std::max(f.back().color, f.back().depth)));
 }
 
+PathMotion SynthSource::motion(double stamp) const {
+  constexpr double kStep = 1e-3;
+  const Rigid3 before = impl_->pose(stamp - kStep), now = impl_->pose(stamp),
+               after = impl_->pose(stamp + kStep);
+  const Eigen::AngleAxisd turn(before.quaternion().conjugate() * after.quaternion());
+  return {(after.translation - before.translation) / (2.0 * kStep),
+          (after.translation - 2.0 * now.translation + before.translation) / (kStep * kStep),
+          turn.angle() * turn.axis() / (2.0 * kStep)};
+}
+
+double SynthSource::start() const { return kFirstStamp; }
+const std::vector<Event>& SynthSource::events() const { return impl_->world->events; }
+
+cv::Mat1b SynthSource::moving(std::size_t index) const {
+  const World& world = *impl_->world;
+  if (world.movers.empty()) return {};
+  const double stamp = impl_->frames.at(index).color;
+  const View view = look(world, impl_->camera.color, impl_->pose(stamp), stamp - kFirstStamp);
+  return cv::Mat1b(view.ids >= static_cast<int>(world.fixed_faces));
+}
+
 ExactFrame SynthSource::exact(std::size_t index) const {
   const Stamps& at = impl_->frames.at(index);
   ExactFrame out;

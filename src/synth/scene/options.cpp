@@ -62,6 +62,8 @@ void SynthOptions::declare(core::OptionTable& table) {
              "Errors of the recording's camera file: a seed that draws some, or differences from the truth, "
              "such as fx=1.5%,cx=3,k1=0.03,slope=0.02,readout=10ms,delay=15ms (also fy, cy, k2, p1, p2, k3, "
              "slope_y)");
+  table.boolean("moving_masks", moving_masks,
+                "Write moving/: a mask for each colour picture, white where something moves");
 }
 
 namespace {
@@ -154,6 +156,12 @@ core::Result<void> check(const SynthOptions& options) {
   return {};
 }
 
+const char* to_string(EventKind kind) {
+  for (const KindName& k : kKinds) {
+    if (k.kind == kind) return k.name;
+  }
+  return "";
+}
 const char* to_string(Texture texture) {
   return texture == Texture::kFull ? "full" : texture == Texture::kWeak ? "weak" : "none";
 }
