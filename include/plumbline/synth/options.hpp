@@ -11,7 +11,7 @@
 namespace plumbline::synth {
 
 enum class Texture { kFull, kWeak, kNone };
-enum class Sensor { kIdeal, kKinect, kRealsense };
+enum class Sensor { kIdeal, kKinect, kRealsense, kTof, kStructured, kStereo, kPhone };
 enum class Motion { kScene, kHandheld, kWheeled };                  ///< kScene: as the scene file says
 enum class Route { kScene, kTour, kLaps, kWander, kThereAndBack };  ///< kScene: as the file says, else a tour
 
@@ -41,6 +41,10 @@ struct SynthOptions {
   /// truth, "fx=1.5%,cx=3,k1=0.03,slope=0.02,readout=10ms,delay=15ms"; "": it is right. Pictures do not
   /// change.
   std::string camera_error;
+  /// Faults of depth, "offset=0.01,scale=1%,holes,mirrors"; a name alone has its usual strength.
+  std::string depth_faults;
+  int depth_width = 0;  ///< of depth images, registered to colour; 0: as colour, or 256 x 192 of a phone
+  int depth_height = 0;
   bool moving_masks = false;  ///< write moving/: pictures of what moves
 
   void declare(core::OptionTable& table);

@@ -184,7 +184,9 @@ nlohmann::json describe_options(const Scene& scene, const SynthOptions& options)
   given.declare(table);
   usual.declare(defaults);
   for (const core::OptionSpec& spec : table.specs()) {
-    if (json.contains(spec.key) || table.value(spec.key) == defaults.value(spec.key)) continue;
+    if (spec.key == "reference_spacing" || json.contains(spec.key) ||
+        table.value(spec.key) == defaults.value(spec.key))
+      continue;
     const auto value = core::parse_yaml(table.value(spec.key), "");
     if (value) json[spec.key] = value->scalar;
   }

@@ -23,7 +23,8 @@ sensor::Camera make_camera(Sensor sensor, int width, int height, double fps) {
   sensor::Camera camera;
   camera.name = fmt::format("synth_{}", to_string(sensor));
   const double s = std::min(width / 640.0, height / 480.0);
-  const bool wide = sensor == Sensor::kRealsense;  // its colour camera is wider in focus: 69 degrees across
+  // Colour cameras 69 degrees across.
+  const bool wide = sensor == Sensor::kRealsense || sensor == Sensor::kStereo || sensor == Sensor::kPhone;
   camera.color = {width,
                   height,
                   (wide ? 462.0 : 535.4) * s,
@@ -32,7 +33,7 @@ sensor::Camera make_camera(Sensor sensor, int width, int height, double fps) {
                   0.5 * height + 7.6 * s};
   if (sensor == Sensor::kIdeal) camera.color.fx = camera.color.fy = 525.0 * s;
   if (sensor == Sensor::kIdeal) camera.color.cx = 0.5 * (width - 1);
-  if (sensor != Sensor::kKinect) camera.color.cy = 0.5 * (height - 1);
+  if (sensor != Sensor::kKinect && sensor != Sensor::kStructured) camera.color.cy = 0.5 * (height - 1);
   camera.depth_scale = 5000.0;
   camera.fps = fps;
   camera.readout_s = 0.0;
@@ -51,6 +52,12 @@ constexpr double kFirstStamp = 100.0;  // seconds; stamps of 0 look like missing
 
 /// Rounds to whole microseconds, the resolution of six decimals in a file.
 double whole_us(double t) { return std::round(t * 1e6) / 1e6; }
+
+/// Of depth images.
+cv::Size depth_size(const SynthOptions& o) {
+  if (o.depth_width > 0) return {o.depth_width, o.depth_height};
+  return o.sensor == Sensor::kPhone ? cv::Size(256, 192) : cv::Size(o.width, o.height);
+}
 
 std::vector<Stamps> make_stamps(const SynthOptions& o, const std::vector<Event>& events, std::size_t frames,
                                 std::uint64_t seed) {
@@ -83,6 +90,7 @@ struct SynthSource::Impl {
   sensor::Camera told;                                 ///< of the recording's file
   sensor::Pinhole images;                              ///< of rectified pictures
   std::shared_ptr<const sensor::Rectifier> rectifier;  ///< by `told`; null: pictures are rectified
+  DepthFaults faults;
   std::uint64_t seed = 0;
   std::shared_ptr<const CameraPath> path;
   std::vector<Stamps> frames;
@@ -96,6 +104,9 @@ struct SynthSource::Impl {
       if (e.kind == kind && e.active(stamp - kFirstStamp)) return e.value;
     }
     return 0.0;
+  }
+  [[nodiscard]] const sensor::Pinhole& depth_camera() const {
+    return camera.depth ? *camera.depth : camera.color;
   }
   [[nodiscard]] core::Result<void> check_way() const;
   void set_exposure();
@@ -259,11 +270,17 @@ core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_p
   impl->camera = make_camera(o.sensor, o.width, o.height, o.fps);
   impl->camera.readout_s = o.readout_s;
   impl->camera.depth_delay_s = o.depth_delay_s;
+  if (const cv::Size depth = depth_size(o); depth != cv::Size(o.width, o.height)) {
+    impl->camera.depth = impl->camera.color.resized(depth.width, depth.height);
+    impl->camera.color_from_depth = Rigid3();
+  }
   auto told = told_camera(o, robot, impl->camera);
   if (!told) return tl::unexpected<core::Error>(told.error());
   impl->told = std::move(*told);
   impl->images = impl->told.color;
-  if (!o.camera_error.empty()) impl->rectifier = std::make_shared<const sensor::Rectifier>(impl->told);
+  impl->faults = *depth_faults(o.depth_faults);
+  if (!o.camera_error.empty() || impl->camera.depth)
+    impl->rectifier = std::make_shared<const sensor::Rectifier>(impl->told);
   impl->seed = mix(static_cast<std::uint64_t>(o.seed), static_cast<std::uint64_t>(robot) + 1);
 
   CameraPath::Options motion;
@@ -328,7 +345,8 @@ dataset::PairInfo SynthSource::info(std::size_t index) const {
 }
 
 std::unique_ptr<dataset::FrameSource> SynthSource::taken_by(const sensor::Camera& better) const {
-  if (!impl_->rectifier) return nullptr;
+  const SynthOptions& o = impl_->world->options;
+  if (o.camera_error.empty() && o.depth_faults.empty()) return nullptr;
   auto impl = std::make_unique<Impl>(*impl_);
   impl->rectifier = std::make_shared<const sensor::Rectifier>(better, impl_->images);
   impl->told = better;
@@ -344,11 +362,12 @@ core::Result<dataset::StoredPair> SynthSource::stored(std::size_t index) const {
   dataset::StoredPair pair;
   pair.color.pixels = impl_->color(at);
   if (blind(index)) {
-    pair.depth.pixels = cv::Mat1w::zeros(pair.color.pixels.size());
+    pair.depth.pixels = cv::Mat1w::zeros(depth_size(impl_->world->options));
   } else {
-    const View view = look(*impl_->world, impl_->camera.color, impl_->pose(at.depth), at.depth - kFirstStamp);
-    pair.depth.pixels = measure_depth(*impl_->world, view, impl_->world->options.sensor, impl_->tiles,
-                                      {impl_->seed, at.number});
+    const View view =
+        look(*impl_->world, impl_->depth_camera(), impl_->pose(at.depth), at.depth - kFirstStamp);
+    pair.depth.pixels = measure_depth(*impl_->world, view, impl_->world->options.sensor, impl_->faults,
+                                      impl_->tiles, {impl_->seed, at.number});
   }
   return pair;
 }
@@ -410,7 +429,7 @@ ExactFrame SynthSource::exact(std::size_t index) const {
   const Stamps& at = impl_->frames.at(index);
   ExactFrame out;
   out.world_from_depth = impl_->pose(at.depth);
-  const View view = look(*impl_->world, impl_->camera.color, out.world_from_depth, at.depth - kFirstStamp);
+  const View view = look(*impl_->world, impl_->depth_camera(), out.world_from_depth, at.depth - kFirstStamp);
   out.depth = exact_depth(view);
   out.face = view.ids;
   return out;

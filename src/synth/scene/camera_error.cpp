@@ -63,6 +63,10 @@ sensor::Camera CameraError::applied(const sensor::Camera& truth) const {
   camera.color.cy += cy;
   const double lens[] = {k1, k2, p1, p2, k3};
   for (std::size_t i = 0; i < std::size(lens); ++i) camera.distortion[i] += lens[i];
+  if (camera.depth) {  // registered to colour: of the same camera
+    camera.depth = camera.color.resized(camera.depth->width, camera.depth->height);
+    camera.depth_lens = camera.lens();
+  }
   camera.depth_slope[0] += slope;
   camera.depth_slope[1] += slope_y;
   camera.readout_s = truth.readout_s.value_or(0.0) + readout;

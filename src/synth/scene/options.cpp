@@ -7,6 +7,7 @@
 
 #include "plumbline/core/config.hpp"
 #include "plumbline/core/numbers.hpp"
+#include "render/depth_faults.hpp"
 #include "scene/camera_error.hpp"
 
 namespace plumbline::synth {
@@ -35,7 +36,13 @@ void SynthOptions::declare(core::OptionTable& table) {
                "Strength of textures; none: white cloth and grey floors");
 
   table.choice("sensor", sensor,
-               {{"ideal", Sensor::kIdeal}, {"kinect", Sensor::kKinect}, {"realsense", Sensor::kRealsense}},
+               {{"ideal", Sensor::kIdeal},
+                {"kinect", Sensor::kKinect},
+                {"realsense", Sensor::kRealsense},
+                {"tof", Sensor::kTof},
+                {"structured", Sensor::kStructured},
+                {"stereo", Sensor::kStereo},
+                {"phone", Sensor::kPhone}},
                "Camera model; ideal: no noise, no offset between stamps, no blur");
   table.choice("motion", motion,
                {{"scene", Motion::kScene}, {"handheld", Motion::kHandheld}, {"wheeled", Motion::kWheeled}},
@@ -62,6 +69,13 @@ void SynthOptions::declare(core::OptionTable& table) {
              "Errors of the recording's camera file: a seed that draws some, or differences from the truth, "
              "such as fx=1.5%,cx=3,k1=0.03,slope=0.02,readout=10ms,delay=15ms (also fy, cy, k2, p1, p2, k3, "
              "slope_y)");
+  table.text(
+      "depth_faults", depth_faults,
+      "Faults of depth, key or key=value, separated by commas: offset (1/m), scale, radial, drift, ray, "
+      "holes, multipath (m), flying, stripes, mirrors; a key alone has its usual strength");
+  table.integer("depth_width", depth_width, {0, 4096}, "px",
+                "Width of depth images, registered to colour; 0: as colour, of a phone 256");
+  table.integer("depth_height", depth_height, {0, 4096}, "px", "Height of depth images");
   table.boolean("moving_masks", moving_masks,
                 "Write moving/: a mask for each colour picture, white where something moves");
 }
@@ -151,6 +165,10 @@ core::Result<void> check(const SynthOptions& options) {
   if (!(options.fps > 0.0) || !(options.speed > 0.0))
     return core::usage_error("fps, speed: must be positive");
   if (auto events = parse_events(options.events); !events) return tl::unexpected<core::Error>(events.error());
+  if (auto faults = depth_faults(options.depth_faults); !faults)
+    return tl::unexpected<core::Error>(faults.error());
+  if ((options.depth_width > 0) != (options.depth_height > 0))
+    return core::usage_error("depth_width, depth_height: give both or none");
   if (auto error = camera_error(options.camera_error, 0, options.width); !error)
     return tl::unexpected<core::Error>(error.error());
   return {};
@@ -166,7 +184,8 @@ const char* to_string(Texture texture) {
   return texture == Texture::kFull ? "full" : texture == Texture::kWeak ? "weak" : "none";
 }
 const char* to_string(Sensor sensor) {
-  return sensor == Sensor::kIdeal ? "ideal" : sensor == Sensor::kKinect ? "kinect" : "realsense";
+  constexpr const char* kNames[] = {"ideal", "kinect", "realsense", "tof", "structured", "stereo", "phone"};
+  return kNames[static_cast<int>(sensor)];
 }
 const char* to_string(Route route) {
   switch (route) {
