@@ -43,7 +43,8 @@ struct SynthOptions {
   std::string camera_error;
   /// Faults of depth, "offset=0.01,scale=1%,holes,mirrors"; a name alone has its usual strength.
   std::string depth_faults;
-  int depth_width = 0;  ///< of depth images, registered to colour; 0: as colour, or 256 x 192 of a phone
+  std::string color_faults;  ///< of colour, "hunting,flicker=100" likewise
+  int depth_width = 0;       ///< of depth images, registered to colour; 0: as colour, or 256 x 192 of a phone
   int depth_height = 0;
   bool moving_masks = false;  ///< write moving/: pictures of what moves
 

@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "plumbline/sensor/rectify.hpp"
+#include "render/color_faults.hpp"
 #include "render/depth_sensor.hpp"
 #include "render/path.hpp"
 #include "render/render.hpp"
@@ -53,7 +54,7 @@ constexpr double kFirstStamp = 100.0;  // seconds; stamps of 0 look like missing
 /// Rounds to whole microseconds, the resolution of six decimals in a file.
 double whole_us(double t) { return std::round(t * 1e6) / 1e6; }
 
-/// Of depth images.
+/// Size of depth images.
 cv::Size depth_size(const SynthOptions& o) {
   if (o.depth_width > 0) return {o.depth_width, o.depth_height};
   return o.sensor == Sensor::kPhone ? cv::Size(256, 192) : cv::Size(o.width, o.height);
@@ -91,6 +92,8 @@ struct SynthSource::Impl {
   sensor::Pinhole images;                              ///< of rectified pictures
   std::shared_ptr<const sensor::Rectifier> rectifier;  ///< by `told`; null: pictures are rectified
   DepthFaults faults;
+  ColorFaults color_faults;
+  LensMarks marks;
   std::uint64_t seed = 0;
   std::shared_ptr<const CameraPath> path;
   std::vector<Stamps> frames;
@@ -111,6 +114,10 @@ struct SynthSource::Impl {
   [[nodiscard]] core::Result<void> check_way() const;
   void set_exposure();
   [[nodiscard]] float gain(std::int64_t number) const;
+  /// Factor of faults on the gain of a frame's row that is taken at `stamp`.
+  [[nodiscard]] float row_gain(const Stamps& at, double stamp) const {
+    return faulty_gain(color_faults, at.color - kFirstStamp, stamp - kFirstStamp, seed);
+  }
   [[nodiscard]] cv::Mat3b color(const Stamps& at) const;
   [[nodiscard]] cv::Mat3b rolling(const Stamps& at, const Exposure& exposure) const;
   [[nodiscard]] cv::Mat2f flow(const View& view, const Stamps& at, double extra_px) const;
@@ -180,9 +187,9 @@ float SynthSource::Impl::gain(std::int64_t number) const {
 
 /// Pixels that things move during the exposure, on a grid 8 times coarser than the picture.
 cv::Mat2f SynthSource::Impl::flow(const View& view, const Stamps& at, double extra_px) const {
-  constexpr double kExposure = 0.010;
-  const Rigid3 later = pose(at.color + 0.5 * kExposure).inverse(),
-               sooner = pose(at.color - 0.5 * kExposure).inverse();
+  const double exposure = color_faults.motion_blur > 0.0 ? color_faults.motion_blur : 0.010;
+  const Rigid3 later = pose(at.color + 0.5 * exposure).inverse(),
+               sooner = pose(at.color - 0.5 * exposure).inverse();
   const int w = (view.ids.cols + 7) / 8, h = (view.ids.rows + 7) / 8;
   cv::Mat2f out(h, w);
 
@@ -220,7 +227,12 @@ cv::Mat3b SynthSource::Impl::rolling(const Stamps& at, const Exposure& exposure)
     View view = look(*world, strip, pose(stamp), stamp - kFirstStamp);
     view.first_row = first;
     view.picture_rows = image.rows;
-    shade(*world, view, exposure).copyTo(image.rowRange(first, first + strip.height));
+    cv::Mat3b rows = shade(*world, view, {exposure.gain * row_gain(at, stamp), exposure.vignette});
+    for (int y = 0; color_faults.flicker > 0.0 && y < rows.rows; ++y) {
+      const double row_stamp = stamp + (y + 0.5 - 0.5 * rows.rows) / image.rows * world->options.readout_s;
+      rows.row(y) *= row_gain(at, row_stamp) / row_gain(at, stamp);
+    }
+    rows.copyTo(image.rowRange(first, first + strip.height));
   }
   return image;
 }
@@ -234,15 +246,19 @@ cv::Mat3b SynthSource::Impl::color(const Stamps& at) const {
   if (event(EventKind::kCover, at.color) != 0.0) exposure.gain *= 0.004F;
   if (event(EventKind::kWhiteout, at.color) != 0.0) exposure.gain *= 60.0F;
 
-  cv::Mat3b image = world->options.readout_s > 0.0 ? rolling(at, exposure) : shade(*world, view, exposure);
+  cv::Mat3b image = world->options.readout_s > 0.0
+                        ? rolling(at, exposure)
+                        : shade(*world, view, {exposure.gain * row_gain(at, at.color), exposure.vignette});
   const double blur = event(EventKind::kBlur, at.color);
+  const bool moves = color_faults.motion_blur > 0.0;
   if (real) {
     cv::GaussianBlur(image, image, {3, 3}, 0.6);  // lens and mosaic
     image = motion_blur(image, flow(view, at, blur));
-  } else if (blur > 0.0) {
+  } else if (blur > 0.0 || moves) {
     image = motion_blur(image, flow(view, at, blur));
   }
 
+  marks.apply(image);
   const float noise_gain = event(EventKind::kLampOff, at.color) != 0.0 ? 3.0F : exposure.gain;
   add_color_noise(image, sensor, noise_gain, tiles, {seed, at.number});
   return image;
@@ -279,6 +295,7 @@ core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_p
   impl->told = std::move(*told);
   impl->images = impl->told.color;
   impl->faults = *depth_faults(o.depth_faults);
+  impl->color_faults = *color_faults(o.color_faults);
   if (!o.camera_error.empty() || impl->camera.depth)
     impl->rectifier = std::make_shared<const sensor::Rectifier>(impl->told);
   impl->seed = mix(static_cast<std::uint64_t>(o.seed), static_cast<std::uint64_t>(robot) + 1);
@@ -309,6 +326,8 @@ core::Result<std::unique_ptr<SynthSource>> SynthSource::create(std::shared_ptr<c
   auto planned = plan(std::move(world), robot);
   if (!planned) return tl::unexpected<core::Error>(planned.error());
   std::unique_ptr<Impl> impl = std::move(*planned);
+  impl->marks =
+      LensMarks(impl->color_faults, {impl->camera.color.width, impl->camera.color.height}, impl->seed);
   impl->tiles = make_noise(impl->world->options.sensor, impl->seed);
   impl->set_exposure();
   return std::unique_ptr<SynthSource>(new SynthSource(std::move(impl)));

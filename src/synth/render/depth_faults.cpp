@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "scene/random.hpp"
-#include "scene/settings.hpp"
 
 namespace plumbline::synth {
 
@@ -88,7 +87,7 @@ FaultyDepth lit_depth(const World& world, const View& view, const DepthFaults& f
         continue;
       }
 
-      const bool glint = m.gloss > 0.25F && cosine > 0.98F;
+      const bool glint = m.gloss > 0.25F && cosine > 0.995F;
       if (faults.holes > 0.0 && (static_cast<double>(cosine) < faults.holes || m.infrared < 0.1F || glint)) {
         z = 0.0F;
         continue;
@@ -123,29 +122,6 @@ void let_fly(double share, std::uint64_t bits, cv::Mat1f& depth) {
 }
 
 }  // namespace
-
-bool DepthFaults::any() const {
-  return offset != 0.0 || scale != 0.0 || radial != 0.0 || drift != 0.0 || ray != 0.0 || holes > 0.0 ||
-         multipath > 0.0 || flying > 0.0 || stripes > 0.0 || mirrors > 0.0;
-}
-
-core::Result<DepthFaults> depth_faults(const std::string& text) {
-  DepthFaults f;
-  const core::Range<double> share{-0.3, 0.3}, some{0.0, 1.0};
-  const auto read = read_settings("depth_faults", text,
-                                  {{"offset", &f.offset, {-0.2, 0.2}, "", 0.01},
-                                   {"scale", &f.scale, share, "ratio", 0.01},
-                                   {"radial", &f.radial, share, "ratio", 0.01},
-                                   {"drift", &f.drift, share, "ratio", 0.005},
-                                   {"ray", &f.ray, some, "", 1.0},
-                                   {"holes", &f.holes, some, "", 0.2},
-                                   {"multipath", &f.multipath, {0.0, 0.5}, "m", 0.04},
-                                   {"flying", &f.flying, some, "ratio", 0.3},
-                                   {"stripes", &f.stripes, some, "ratio", 0.005},
-                                   {"mirrors", &f.mirrors, some, "", 0.55}});
-  if (!read) return tl::unexpected<core::Error>(read.error());
-  return f;
-}
 
 FaultyDepth faulty_depth(const World& world, const View& view, const DepthFaults& faults,
                          std::uint64_t bits) {

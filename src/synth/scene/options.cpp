@@ -7,8 +7,8 @@
 
 #include "plumbline/core/config.hpp"
 #include "plumbline/core/numbers.hpp"
-#include "render/depth_faults.hpp"
 #include "scene/camera_error.hpp"
+#include "scene/faults.hpp"
 
 namespace plumbline::synth {
 
@@ -73,6 +73,10 @@ void SynthOptions::declare(core::OptionTable& table) {
       "depth_faults", depth_faults,
       "Faults of depth, key or key=value, separated by commas: offset (1/m), scale, radial, drift, ray, "
       "holes, multipath (m), flying, stripes, mirrors; a key alone has its usual strength");
+  table.text(
+      "color_faults", color_faults,
+      "Faults of colour, key or key=value, separated by commas: hunting, jumps, flicker (Hz), motion_blur "
+      "(s), dots, specks; a key alone has its usual strength");
   table.integer("depth_width", depth_width, {0, 4096}, "px",
                 "Width of depth images, registered to colour; 0: as colour, of a phone 256");
   table.integer("depth_height", depth_height, {0, 4096}, "px", "Height of depth images");
@@ -166,6 +170,8 @@ core::Result<void> check(const SynthOptions& options) {
     return core::usage_error("fps, speed: must be positive");
   if (auto events = parse_events(options.events); !events) return tl::unexpected<core::Error>(events.error());
   if (auto faults = depth_faults(options.depth_faults); !faults)
+    return tl::unexpected<core::Error>(faults.error());
+  if (auto faults = color_faults(options.color_faults); !faults)
     return tl::unexpected<core::Error>(faults.error());
   if ((options.depth_width > 0) != (options.depth_height > 0))
     return core::usage_error("depth_width, depth_height: give both or none");
