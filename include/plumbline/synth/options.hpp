@@ -46,6 +46,9 @@ struct SynthOptions {
   std::string color_faults;  ///< of colour, "hunting,flicker=100" likewise
   int depth_width = 0;       ///< of depth images, registered to colour; 0: as colour, or 256 x 192 of a phone
   int depth_height = 0;
+  std::string imu;       ///< write imu.csv: "ideal" or "usual", and settings, "usual,delay=5ms"; "": none
+  std::string odometry;  ///< write odometry.csv, likewise
+  bool mcap = false;     ///< write each recording as an MCAP file instead of a folder of pictures
   bool moving_masks = false;  ///< write moving/: pictures of what moves
 
   void declare(core::OptionTable& table);

@@ -28,6 +28,7 @@ struct ExactFrame {
 
 /// Motion of the camera at one moment.
 struct PathMotion {
+  geometry::Rigid3 world_from_camera;
   Eigen::Vector3d velocity;      ///< m/s, world
   Eigen::Vector3d acceleration;  ///< m/s^2, world, without gravity
   Eigen::Vector3d turn_rate;     ///< rad/s, in the camera's frame

@@ -11,9 +11,12 @@
 #include "plumbline/core/version.hpp"
 #include "plumbline/dataset/image_io.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
+#include "recording/body_sensors.hpp"
+#include "recording/mcap_film.hpp"
 #include "recording/plan_file.hpp"
 #include "recording/reference.hpp"
 #include "recording/truth_files.hpp"
+#include "scene/random.hpp"
 
 namespace plumbline::synth {
 
@@ -34,25 +37,32 @@ dataset::PairInfo labelled(const SynthSource& source, std::size_t index) {
   return info;
 }
 
-/// Writes one pair; "" or what went wrong. `moving`: share of the colour picture; its mask is written if
-/// asked.
-std::string write_pair(const SynthSource& source, std::size_t index, const fs::path& folder, bool mask,
-                       double& moving) {
+/// Share of a colour picture that moves; its mask is written if asked.
+Result<double> write_moving(const SynthSource& source, std::size_t index, const fs::path& folder, bool mask) {
+  cv::Mat1b moves = source.moving(index);
+  const double share = moves.empty() ? 0.0 : cv::countNonZero(moves) / static_cast<double>(moves.total());
+  if (!mask) return share;
+  const sensor::Pinhole& size = source.camera().color;
+  if (moves.empty()) moves = cv::Mat1b::zeros(size.height, size.width);
+  const std::string name = color_name(labelled(source, index)).substr(4);
+  if (auto ok = dataset::write_png(folder / "moving" / name, moves); !ok)
+    return tl::unexpected<core::Error>(ok.error());
+  return share;
+}
+
+/// Writes one pair; "" or what went wrong.
+std::string write_pair(const SynthSource& source, std::size_t index, const fs::path& folder) {
   const auto pair = source.stored(index);
   if (!pair) return pair.error().message;
   const dataset::PairInfo info = labelled(source, index);
   auto written = dataset::write_png(folder / color_name(info), pair->color.pixels);
   if (written) written = dataset::write_png(folder / depth_name(info), pair->depth.pixels);
-
-  cv::Mat1b moves = source.moving(index);
-  moving = moves.empty() ? 0.0 : cv::countNonZero(moves) / static_cast<double>(moves.total());
-  if (mask && moves.empty()) moves = cv::Mat1b::zeros(pair->color.pixels.size());
-  if (mask && written) written = dataset::write_png(folder / "moving" / color_name(info).substr(4), moves);
   return written ? "" : written.error().message;
 }
 
 /// Lists, truth and camera of the first `frames` pairs.
-Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs::path& folder) {
+Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs::path& folder,
+                         bool pictures) {
   std::string color = "# timestamp filename\n", depth = color, pairs;
   geometry::Trajectory truth;
 
@@ -69,9 +79,11 @@ Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs
 
   std::sort(truth.begin(), truth.end(),
             [](const geometry::StampedPose& a, const geometry::StampedPose& b) { return a.stamp < b.stamp; });
-  if (auto ok = core::write_file(folder / "rgb.txt", color); !ok) return ok;
-  if (auto ok = core::write_file(folder / "depth.txt", depth); !ok) return ok;
-  if (auto ok = core::write_file(folder / "associations.txt", pairs); !ok) return ok;
+  if (pictures) {
+    if (auto ok = core::write_file(folder / "rgb.txt", color); !ok) return ok;
+    if (auto ok = core::write_file(folder / "depth.txt", depth); !ok) return ok;
+    if (auto ok = core::write_file(folder / "associations.txt", pairs); !ok) return ok;
+  }
   if (auto ok = core::write_file(folder / "camera.yaml", sensor::to_yaml(source.camera())); !ok) return ok;
 
   return dataset::write_trajectory(folder / "groundtruth.txt", truth);
@@ -80,43 +92,80 @@ Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs
 /// State of one robot's recording.
 struct Job {
   const SynthSource& source;
+  const SynthOptions& options;
   fs::path folder;
-  std::size_t done_before;  ///< frames of the robots before
-  std::size_t all_frames;
-  bool masks;
+  std::uint64_t seed;
+  const core::Executor& executor;
+  const core::StopToken& stop;
+  Progress progress;  ///< frames of this recording, and all of them
 };
 
-/// Returns the number of frames written; smaller than the total if stopped.
-Result<std::size_t> write_frames(const Job& job, const core::Executor& executor, const core::StopToken& stop,
-                                 const Progress& progress) {
-  for (const char* sub : {"rgb", "depth", "moving"}) {
-    if (!job.masks && sub == std::string("moving")) continue;
-    if (auto ok = core::make_folder(job.folder / sub); !ok) return tl::unexpected<core::Error>(ok.error());
-  }
-
-  const std::size_t batch = static_cast<std::size_t>(executor.threads()) * 4;
+/// Writes pictures; returns the number of frames, smaller than the total if stopped.
+Result<std::size_t> write_pictures(const Job& job) {
+  const std::size_t batch = static_cast<std::size_t>(job.executor.threads()) * 4;
   std::size_t done = 0;
-  std::vector<double> moving(job.source.size());
 
-  while (done < job.source.size() && !stop.stop_requested()) {
+  while (done < job.source.size() && !job.stop.stop_requested()) {
     const std::size_t count = std::min(batch, job.source.size() - done);
     std::vector<std::string> problems(count);
-    executor.parallel_for(count, [&](std::size_t i) {
-      problems[i] = write_pair(job.source, done + i, job.folder, job.masks, moving[done + i]);
-    });
+    job.executor.parallel_for(
+        count, [&](std::size_t i) { problems[i] = write_pair(job.source, done + i, job.folder); });
     for (const std::string& problem : problems) {
       if (!problem.empty()) return core::output_error(problem);
     }
     done += count;
-    if (progress) progress(job.done_before + done, job.all_frames);
+    job.progress(done, job.source.size());
   }
 
-  moving.resize(done);
-  auto ok = write_lists(job.source, done, job.folder);
+  return done;
+}
+
+/// Truth beside the first `frames` frames.
+Result<void> write_truth(const Job& job, std::size_t frames) {
+  std::vector<Result<double>> shares(frames, 0.0);
+  job.executor.parallel_for(frames, [&](std::size_t i) {
+    shares[i] = write_moving(job.source, i, job.folder, job.options.moving_masks);
+  });
+  std::vector<double> moving;
+  for (const auto& share : shares) {
+    if (!share) return tl::unexpected<core::Error>(share.error());
+    moving.push_back(*share);
+  }
+
+  auto ok = write_lists(job.source, frames, job.folder, !job.options.mcap);
   if (ok) ok = core::write_file(job.folder / "truth.csv", describe_truth(job.source, moving));
   if (ok && !job.source.events().empty())
     ok = core::write_file(job.folder / "events.csv", describe_events(job.source));
+  if (ok && !job.options.camera_error.empty())
+    ok = core::write_file(job.folder / "camera.true.yaml", sensor::to_yaml(job.source.true_camera()));
+  return ok;
+}
+
+/// Returns the number of frames written; smaller than the total if stopped.
+Result<std::size_t> write_frames(const Job& job, core::Log& log) {
+  auto ok = core::make_folder(job.folder);
+  for (const auto& [sub, wanted] :
+       {std::pair("rgb", !job.options.mcap), std::pair("depth", !job.options.mcap),
+        std::pair("moving", job.options.moving_masks)}) {
+    if (ok && wanted) ok = core::make_folder(job.folder / sub);
+  }
   if (!ok) return tl::unexpected<core::Error>(ok.error());
+
+  dataset::BodyReadings body;
+  body.body_from_camera = body_from_camera();
+  if (!job.options.imu.empty()) body.imu = imu_readings(job.source, *imu_model(job.options.imu), job.seed);
+  if (!job.options.odometry.empty())
+    body.odometry = odometry_readings(job.source, *odometry_model(job.options.odometry), job.seed);
+  if (!body.imu.empty()) ok = core::write_file(job.folder / "imu.csv", describe_imu(body.imu));
+  if (ok && !body.odometry.empty())
+    ok = core::write_file(job.folder / "odometry.csv", describe_odometry(body.odometry));
+  if (!ok) return tl::unexpected<core::Error>(ok.error());
+
+  const auto done = job.options.mcap ? write_mcap(job.source, job.folder / "recording.mcap", &body,
+                                                  job.executor, job.stop, job.progress, log)
+                                     : write_pictures(job);
+  if (!done) return done;
+  if (ok = write_truth(job, *done); !ok) return tl::unexpected<core::Error>(ok.error());
   return done;
 }
 
@@ -235,7 +284,7 @@ Result<std::vector<std::unique_ptr<SynthSource>>> open_all(const std::shared_ptr
 Result<nlohmann::json> write_robots(const std::vector<std::unique_ptr<SynthSource>>& sources,
                                     const Scene& scene, const SynthOptions& options, const fs::path& output,
                                     const core::Executor& executor, const core::StopToken& stop,
-                                    const Progress& progress, WriteSummary& summary) {
+                                    core::Log& log, const Progress& progress, WriteSummary& summary) {
   summary.robots = static_cast<int>(sources.size());
   std::size_t all_frames = 0;
   for (const auto& source : sources) all_frames += source->size();
@@ -244,15 +293,18 @@ Result<nlohmann::json> write_robots(const std::vector<std::unique_ptr<SynthSourc
 
   for (std::size_t i = 0; i < sources.size() && !stop.stop_requested(); ++i) {
     const std::string folder = folder_name(static_cast<int>(i));
-    const auto written =
-        write_frames({*sources[i], output / folder, summary.frames, all_frames, options.moving_masks},
-                     executor, stop, progress);
+    const std::size_t before = summary.frames;
+    const Job job{*sources[i],
+                  options,
+                  output / folder,
+                  mix(static_cast<std::uint64_t>(options.seed), static_cast<std::uint64_t>(i) + 1),
+                  executor,
+                  stop,
+                  [&](std::size_t done, std::size_t) {
+                    if (progress) progress(before + done, all_frames);
+                  }};
+    const auto written = write_frames(job, log);
     if (!written) return tl::unexpected<core::Error>(written.error());
-    if (!options.camera_error.empty()) {
-      const std::string truth = sensor::to_yaml(sources[i]->true_camera());
-      if (auto ok = core::write_file(output / folder / "camera.true.yaml", truth); !ok)
-        return tl::unexpected<core::Error>(ok.error());
-    }
     summary.frames += *written;
     summary.path_m += sources[i]->path_length();
     robots.push_back(
@@ -317,7 +369,7 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
   if (auto ok = core::make_folder(output); !ok) return fail(ok.error());
 
   WriteSummary summary;
-  const auto robots = write_robots(*sources, scene, options, output, executor, stop, progress, summary);
+  const auto robots = write_robots(*sources, scene, options, output, executor, stop, log, progress, summary);
   if (!robots) return fail(robots.error());
   summary.reference_spacing_m =
       options.reference_spacing > 0.0 ? options.reference_spacing : default_spacing(scene);

@@ -428,7 +428,7 @@ PathMotion SynthSource::motion(double stamp) const {
   const Rigid3 before = impl_->pose(stamp - kStep), now = impl_->pose(stamp),
                after = impl_->pose(stamp + kStep);
   const Eigen::AngleAxisd turn(before.quaternion().conjugate() * after.quaternion());
-  return {(after.translation - before.translation) / (2.0 * kStep),
+  return {now, (after.translation - before.translation) / (2.0 * kStep),
           (after.translation - 2.0 * now.translation + before.translation) / (kStep * kStep),
           turn.angle() * turn.axis() / (2.0 * kStep)};
 }

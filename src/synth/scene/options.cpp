@@ -80,6 +80,14 @@ void SynthOptions::declare(core::OptionTable& table) {
   table.integer("depth_width", depth_width, {0, 4096}, "px",
                 "Width of depth images, registered to colour; 0: as colour, of a phone 256");
   table.integer("depth_height", depth_height, {0, 4096}, "px", "Height of depth images");
+  table.text(
+      "imu", imu,
+      "Write imu.csv: ideal or usual, then settings, such as usual,gyro_bias=0.01,delay=5ms (rate, "
+      "gyro_noise, gyro_bias, gyro_walk, accel_noise, accel_bias, accel_walk, scale, misalign, delay, gaps)");
+  table.text("odometry", odometry,
+             "Write odometry.csv of wheels: ideal or usual, then settings (rate, scale, turn, noise, slip)");
+  table.choice("out_format", mcap, {{"folder", false}, {"mcap", true}},
+               "Write a folder of pictures or an MCAP file for each recording");
   table.boolean("moving_masks", moving_masks,
                 "Write moving/: a mask for each colour picture, white where something moves");
 }
@@ -173,6 +181,9 @@ core::Result<void> check(const SynthOptions& options) {
     return tl::unexpected<core::Error>(faults.error());
   if (auto faults = color_faults(options.color_faults); !faults)
     return tl::unexpected<core::Error>(faults.error());
+  if (auto imu = imu_model(options.imu); !imu) return tl::unexpected<core::Error>(imu.error());
+  if (auto wheels = odometry_model(options.odometry); !wheels)
+    return tl::unexpected<core::Error>(wheels.error());
   if ((options.depth_width > 0) != (options.depth_height > 0))
     return core::usage_error("depth_width, depth_height: give both or none");
   if (auto error = camera_error(options.camera_error, 0, options.width); !error)
