@@ -48,6 +48,7 @@ struct SynthOptions {
   int depth_height = 0;
   std::string imu;       ///< write imu.csv: "ideal" or "usual", and settings, "usual,delay=5ms"; "": none
   std::string odometry;  ///< write odometry.csv, likewise
+  std::string rig;       ///< YAML file of several cameras on one body, each a recording; "": one
   bool mcap = false;     ///< write each recording as an MCAP file instead of a folder of pictures
   bool moving_masks = false;  ///< write moving/: pictures of what moves
 

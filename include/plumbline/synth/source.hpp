@@ -26,12 +26,12 @@ struct ExactFrame {
   cv::Mat face;   ///< CV_32SC1, index into Scene::faces, beyond them: a walker's, -1 = nothing hit
 };
 
-/// Motion of the camera at one moment.
+/// Motion of the camera, or of a frame that is fixed to it, at one moment.
 struct PathMotion {
-  geometry::Rigid3 world_from_camera;
+  geometry::Rigid3 world_from_frame;
   Eigen::Vector3d velocity;      ///< m/s, world
   Eigen::Vector3d acceleration;  ///< m/s^2, world, without gravity
-  Eigen::Vector3d turn_rate;     ///< rad/s, in the camera's frame
+  Eigen::Vector3d turn_rate;     ///< rad/s, in that frame
 };
 
 class SynthSource final : public dataset::FrameSource {
@@ -60,8 +60,10 @@ class SynthSource final : public dataset::FrameSource {
 
   /// Exact pose at any time between first and last stamp (clamped to them).
   [[nodiscard]] geometry::Rigid3 world_from_camera(double stamp) const;
-  /// At any time; outside of the recording the path goes on.
-  [[nodiscard]] PathMotion motion(double stamp) const;
+  /// At any time; outside of the recording the path goes on. `camera_from_frame`: whose motion it is.
+  [[nodiscard]] PathMotion motion(double stamp, const geometry::Rigid3& camera_from_frame = {}) const;
+  /// Pose of the camera on its body, whose x is forward and z up.
+  [[nodiscard]] const geometry::Rigid3& body_from_camera() const;
   /// Time of the first frame without jitter, from which events count.
   [[nodiscard]] double start() const;
   [[nodiscard]] const std::vector<Event>& events() const;

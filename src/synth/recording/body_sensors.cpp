@@ -27,18 +27,12 @@ Eigen::Matrix3d wrong_axes(Rng& rng, double scale, double misalign) {
   return axes;
 }
 
-double yaw_of(const geometry::Rigid3& world_from_camera) {
-  const Vector3d ahead = world_from_camera.rotation * Vector3d::UnitZ();
+double yaw_of(const geometry::Rigid3& world_from_body) {
+  const Vector3d ahead = world_from_body.rotation * Vector3d::UnitX();
   return std::atan2(ahead.y(), ahead.x());
 }
 
 }  // namespace
-
-geometry::Rigid3 body_from_camera() {
-  Eigen::Matrix3d r;
-  r << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  return {Eigen::Quaterniond(r), Vector3d::Zero()};
-}
 
 std::vector<dataset::ImuReading> imu_readings(const SynthSource& source, const ImuModel& model,
                                               std::uint64_t seed) {
@@ -48,18 +42,16 @@ std::vector<dataset::ImuReading> imu_readings(const SynthSource& source, const I
   Vector3d gyro_bias = normals(rng, model.gyro_bias), accel_bias = normals(rng, model.accel_bias);
   const Eigen::Matrix3d gyro_axes = wrong_axes(rng, model.scale, model.misalign);
   const Eigen::Matrix3d accel_axes = wrong_axes(rng, model.scale, model.misalign);
-  const Eigen::Matrix3d to_body = body_from_camera().rotation;
+  const geometry::Rigid3 camera_from_body = source.body_from_camera().inverse();
   std::vector<dataset::ImuReading> readings;
   double silent_until = -1.0;
 
   const double first = source.info(0).stamp, last = source.info(source.size() - 1).stamp;
   for (double t = first; t <= last + step; t += step) {
-    const PathMotion motion = source.motion(t);
-    const Vector3d force = motion.world_from_camera.rotation.transpose() * (motion.acceleration - gravity);
-    const Vector3d gyro =
-        gyro_axes * (to_body * motion.turn_rate) + gyro_bias + normals(rng, model.gyro_noise * root);
-    const Vector3d accel =
-        accel_axes * (to_body * force) + accel_bias + normals(rng, model.accel_noise * root);
+    const PathMotion motion = source.motion(t, camera_from_body);
+    const Vector3d force = motion.world_from_frame.rotation.transpose() * (motion.acceleration - gravity);
+    const Vector3d gyro = gyro_axes * motion.turn_rate + gyro_bias + normals(rng, model.gyro_noise * root);
+    const Vector3d accel = accel_axes * force + accel_bias + normals(rng, model.accel_noise * root);
     gyro_bias += normals(rng, model.gyro_walk * std::sqrt(step));
     accel_bias += normals(rng, model.accel_walk * std::sqrt(step));
     if (rng.chance(model.gaps / 60.0 * step)) silent_until = t + 0.05;
@@ -71,6 +63,7 @@ std::vector<dataset::ImuReading> imu_readings(const SynthSource& source, const I
 std::vector<dataset::OdometryReading> odometry_readings(const SynthSource& source, const OdometryModel& model,
                                                         std::uint64_t seed) {
   const double step = 1.0 / model.rate;
+  const geometry::Rigid3 camera_from_body = source.body_from_camera().inverse();
   Rng rng(seed, 0x0d0);
   const double scale = 1.0 + model.scale * rng.normal(), turn = 1.0 + model.turn * rng.normal();
   std::vector<dataset::OdometryReading> readings;
@@ -80,8 +73,8 @@ std::vector<dataset::OdometryReading> odometry_readings(const SynthSource& sourc
   const double first = source.info(0).stamp, last = source.info(source.size() - 1).stamp;
   for (double t = first; t <= last + step; t += step) {
     // The wheels turn from this reading to the next.
-    const geometry::Rigid3 from = source.motion(t).world_from_camera,
-                           to = source.motion(t + step).world_from_camera;
+    const geometry::Rigid3 from = source.motion(t, camera_from_body).world_from_frame,
+                           to = source.motion(t + step, camera_from_body).world_from_frame;
     const double heading = yaw_of(from), turned = std::remainder(yaw_of(to) - heading, 2.0 * M_PI);
     const Eigen::Rotation2Dd into_body(-(heading + 0.5 * turned));
     if (rng.chance(model.slip / 60.0 * step)) slips_until = t + 0.3;

@@ -12,9 +12,6 @@
 
 namespace plumbline::synth {
 
-/// Pose of the camera (x right, y down, z forward) on its body.
-geometry::Rigid3 body_from_camera();
-
 /// Readings from the first frame to the last.
 std::vector<dataset::ImuReading> imu_readings(const SynthSource& source, const ImuModel& model,
                                               std::uint64_t seed);

@@ -17,6 +17,7 @@
 #include "recording/reference.hpp"
 #include "recording/truth_files.hpp"
 #include "scene/random.hpp"
+#include "scene/rig.hpp"
 
 namespace plumbline::synth {
 
@@ -152,7 +153,7 @@ Result<std::size_t> write_frames(const Job& job, core::Log& log) {
   if (!ok) return tl::unexpected<core::Error>(ok.error());
 
   dataset::BodyReadings body;
-  body.body_from_camera = body_from_camera();
+  body.body_from_camera = job.source.body_from_camera();
   if (!job.options.imu.empty()) body.imu = imu_readings(job.source, *imu_model(job.options.imu), job.seed);
   if (!job.options.odometry.empty())
     body.odometry = odometry_readings(job.source, *odometry_model(job.options.odometry), job.seed);
@@ -197,6 +198,12 @@ nlohmann::json describe_robot(const SynthSource& source, const std::string& fold
   if (!options.camera_error.empty()) {
     json["camera"] = {{"file", describe_camera(source.camera())},
                       {"true", describe_camera(source.true_camera())}};
+  }
+  if (!options.rig.empty()) {
+    const Eigen::Quaterniond turn = source.body_from_camera().quaternion();
+    const Eigen::Vector3d& place = source.body_from_camera().translation;
+    json["body_from_camera"] = {{"position_m", {place.x(), place.y(), place.z()}},
+                                {"quaternion_xyzw", {turn.x(), turn.y(), turn.z(), turn.w()}}};
   }
   return json;
 }
@@ -272,7 +279,7 @@ Result<void> check_free(const fs::path& output) {
 
 Result<std::vector<std::unique_ptr<SynthSource>>> open_all(const std::shared_ptr<const World>& world) {
   std::vector<std::unique_ptr<SynthSource>> sources;
-  for (int i = 0; i < world->options.robots; ++i) {
+  for (int i = 0; i < recordings(world->options); ++i) {
     auto source = SynthSource::create(world, i);
     if (!source) return tl::unexpected<core::Error>(source.error());
     sources.push_back(std::move(*source));
@@ -297,7 +304,7 @@ Result<nlohmann::json> write_robots(const std::vector<std::unique_ptr<SynthSourc
     const Job job{*sources[i],
                   options,
                   output / folder,
-                  mix(static_cast<std::uint64_t>(options.seed), static_cast<std::uint64_t>(i) + 1),
+                  mix(static_cast<std::uint64_t>(options.seed), options.rig.empty() ? i + 1 : 1),
                   executor,
                   stop,
                   [&](std::size_t done, std::size_t) {
@@ -307,8 +314,9 @@ Result<nlohmann::json> write_robots(const std::vector<std::unique_ptr<SynthSourc
     if (!written) return tl::unexpected<core::Error>(written.error());
     summary.frames += *written;
     summary.path_m += sources[i]->path_length();
-    robots.push_back(
-        describe_robot(*sources[i], folder, scene.robots[i % scene.robots.size()].name, *written, options));
+    robots.push_back(describe_robot(*sources[i], folder,
+                                    scene.robots[options.rig.empty() ? i % scene.robots.size() : 0].name,
+                                    *written, options));
   }
 
   summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -14,6 +14,7 @@
 #include "render/render.hpp"
 #include "scene/camera_error.hpp"
 #include "scene/random.hpp"
+#include "scene/rig.hpp"
 
 namespace plumbline::synth {
 
@@ -91,6 +92,7 @@ struct SynthSource::Impl {
   sensor::Camera told;                                 ///< of the recording's file
   sensor::Pinhole images;                              ///< of rectified pictures
   std::shared_ptr<const sensor::Rectifier> rectifier;  ///< by `told`; null: pictures are rectified
+  Rigid3 body_from_camera;
   DepthFaults faults;
   ColorFaults color_faults;
   LensMarks marks;
@@ -101,7 +103,13 @@ struct SynthSource::Impl {
   std::vector<float> gains;  ///< automatic exposure, every kGainStep frames
   static constexpr int kGainStep = 10;
 
-  [[nodiscard]] Rigid3 pose(double stamp) const { return path->world_from_camera(stamp - kFirstStamp); }
+  /// Pose of the camera, which looks ahead along the path if it is not one of a rig.
+  [[nodiscard]] Rigid3 at(double t) const {
+    const Rigid3 ahead = path->world_from_camera(t);
+    return world->options.rig.empty() ? ahead
+                                      : ahead * synth::body_from_camera().inverse() * body_from_camera;
+  }
+  [[nodiscard]] Rigid3 pose(double stamp) const { return at(stamp - kFirstStamp); }
   [[nodiscard]] double event(EventKind kind, double stamp) const {
     for (const Event& e : world->events) {
       if (e.kind == kind && e.active(stamp - kFirstStamp)) return e.value;
@@ -126,7 +134,9 @@ struct SynthSource::Impl {
 /// Every step from frame to frame must be free, and must not start inside something.
 core::Result<void> SynthSource::Impl::check_way() const {
   const RobotPath& robot_path =
-      world->scene.robots[static_cast<std::size_t>(robot) % world->scene.robots.size()];
+      world->scene
+          .robots[world->options.rig.empty() ? static_cast<std::size_t>(robot) % world->scene.robots.size()
+                                             : 0];
   const auto complain = [&](const Vector3d& p, double t, const Hit& hit, const char* how) {
     const std::size_t k = path->waypoint_at(t), n = robot_path.waypoints.size();
     const Object& thing =
@@ -142,25 +152,25 @@ core::Result<void> SynthSource::Impl::check_way() const {
   };
 
   const double end = frames.back().color - kFirstStamp;
-  const Vector3d first = path->world_from_camera(0.0).translation;
+  const Vector3d first = at(0.0).translation;
   const Vector3d up = Vector3d(0.0123, 0.0211, 1.0).normalized();
   if (const Hit hit = world->cast(first, up, 1e4); hit.face >= 0 && !hit.front) {
     return complain(first, 0.0, hit, "starts inside");
   }
 
-  Vector3d at = first;
+  Vector3d here = first;
   const double once = std::min(end, 2.0 * path->duration() + 60.0);  // later rounds repeat the first
 
   for (double t = 0.02; t <= once; t += 0.02) {
-    const Vector3d to = path->world_from_camera(t).translation;
-    const Vector3d step = to - at;
+    const Vector3d to = at(t).translation;
+    const Vector3d step = to - here;
     const double length = step.norm();
     if (length > 1e-7) {
       // 5 cm of room in front of the camera body
-      const Hit hit = world->cast(at, step / length, length + 0.05);
+      const Hit hit = world->cast(here, step / length, length + 0.05);
       if (hit.face >= 0) return complain(to, t, hit, "goes through");
     }
-    at = to;
+    here = to;
   }
 
   return {};
@@ -172,8 +182,7 @@ void SynthSource::Impl::set_exposure() {
   float level = 0.0F;
   for (std::size_t i = 0; i < last; ++i) {
     const double t = static_cast<double>(i * kGainStep) / world->options.fps;
-    const float now =
-        std::max(0.02F, mean_level(*world, look(*world, small.color, path->world_from_camera(t))));
+    const float now = std::max(0.02F, mean_level(*world, look(*world, small.color, this->at(t))));
     level = i == 0 ? now : level + 0.25F * (now - level);
     gains.push_back(std::clamp(0.68F / level, 0.35F, 3.0F));
   }
@@ -272,17 +281,18 @@ core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_p
                                                                    int robot) {
   const SynthOptions& o = world->options;
   if (auto ok = check(o); !ok) return tl::unexpected<core::Error>(ok.error());
-  if (robot < 0 || robot >= o.robots) {
+  if (robot < 0 || robot >= recordings(o)) {
     return core::usage_error(
-        fmt::format("robot {} of {}: robots count from 0 to {}", robot, o.robots, o.robots - 1));
+        fmt::format("robot {} of {}: robots count from 0 to {}", robot, recordings(o), recordings(o) - 1));
   }
 
   const auto paths = world->scene.robots.size();
-  const RobotPath& way = world->scene.robots[static_cast<std::size_t>(robot) % paths];
+  const int driver = o.rig.empty() ? robot : 0;
+  const RobotPath& way = world->scene.robots[static_cast<std::size_t>(driver) % paths];
   auto impl = std::make_unique<Impl>();
   impl->world = world;
   impl->robot = robot;
-  impl->name = o.robots > 1 ? fmt::format("{}-robot{}", world->scene.name, robot) : world->scene.name;
+  impl->name = recordings(o) > 1 ? fmt::format("{}-robot{}", world->scene.name, robot) : world->scene.name;
   impl->camera = make_camera(o.sensor, o.width, o.height, o.fps);
   impl->camera.readout_s = o.readout_s;
   impl->camera.depth_delay_s = o.depth_delay_s;
@@ -294,6 +304,8 @@ core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_p
   if (!told) return tl::unexpected<core::Error>(told.error());
   impl->told = std::move(*told);
   impl->images = impl->told.color;
+  impl->body_from_camera =
+      o.rig.empty() ? synth::body_from_camera() : (*read_rig(o))[static_cast<std::size_t>(robot)];
   impl->faults = *depth_faults(o.depth_faults);
   impl->color_faults = *color_faults(o.color_faults);
   if (!o.camera_error.empty() || impl->camera.depth)
@@ -303,10 +315,10 @@ core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_p
   CameraPath::Options motion;
   motion.speed = o.speed;
   motion.wheeled = (o.motion == Motion::kScene ? world->scene.motion : o.motion) == Motion::kWheeled;
-  motion.seed = impl->seed;
+  motion.seed = mix(static_cast<std::uint64_t>(o.seed), static_cast<std::uint64_t>(driver) + 1);
 
   // More robots than paths: the next ones start further along.
-  const auto lap = static_cast<std::size_t>(robot) / paths;
+  const auto lap = static_cast<std::size_t>(driver) / paths;
   motion.start_share = 0.381966 * static_cast<double>(lap);
   motion.events = world->events;
   impl->path = std::make_shared<const CameraPath>(way, motion);
@@ -339,7 +351,7 @@ core::Result<void> check_paths(const Scene& scene, const SynthOptions& options) 
     return core::usage_error(
         fmt::format("scene '{}' has no surfaces or no robot; add `objects:` and `robots:`", scene.name));
   const auto world = std::make_shared<const World>(scene, options);
-  for (int robot = 0; robot < options.robots; ++robot) {
+  for (int robot = 0; robot < recordings(options); ++robot) {
     if (auto planned = SynthSource::plan(world, robot); !planned)
       return tl::unexpected<core::Error>(planned.error());
   }
@@ -423,16 +435,16 @@ Rigid3 SynthSource::world_from_camera(double stamp) const {
                                 std::max(f.back().color, f.back().depth)));
 }
 
-PathMotion SynthSource::motion(double stamp) const {
+PathMotion SynthSource::motion(double stamp, const Rigid3& camera_from_frame) const {
   constexpr double kStep = 1e-3;
-  const Rigid3 before = impl_->pose(stamp - kStep), now = impl_->pose(stamp),
-               after = impl_->pose(stamp + kStep);
-  const Eigen::AngleAxisd turn(before.quaternion().conjugate() * after.quaternion());
+  const auto at = [&](double t) { return impl_->pose(t) * camera_from_frame; };
+  const Rigid3 before = at(stamp - kStep), now = at(stamp), after = at(stamp + kStep);
   return {now, (after.translation - before.translation) / (2.0 * kStep),
           (after.translation - 2.0 * now.translation + before.translation) / (kStep * kStep),
-          turn.angle() * turn.axis() / (2.0 * kStep)};
+          geometry::log_so3(before.rotation.transpose() * after.rotation) / (2.0 * kStep)};
 }
 
+const Rigid3& SynthSource::body_from_camera() const { return impl_->body_from_camera; }
 double SynthSource::start() const { return kFirstStamp; }
 const std::vector<Event>& SynthSource::events() const { return impl_->world->events; }
 

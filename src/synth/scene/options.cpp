@@ -9,6 +9,7 @@
 #include "plumbline/core/numbers.hpp"
 #include "scene/camera_error.hpp"
 #include "scene/faults.hpp"
+#include "scene/rig.hpp"
 
 namespace plumbline::synth {
 
@@ -86,6 +87,7 @@ void SynthOptions::declare(core::OptionTable& table) {
       "gyro_noise, gyro_bias, gyro_walk, accel_noise, accel_bias, accel_walk, scale, misalign, delay, gaps)");
   table.text("odometry", odometry,
              "Write odometry.csv of wheels: ideal or usual, then settings (rate, scale, turn, noise, slip)");
+  table.text("rig", rig, "YAML file with the cameras of one body: each makes a recording of the same path");
   table.choice("out_format", mcap, {{"folder", false}, {"mcap", true}},
                "Write a folder of pictures or an MCAP file for each recording");
   table.boolean("moving_masks", moving_masks,
@@ -184,6 +186,7 @@ core::Result<void> check(const SynthOptions& options) {
   if (auto imu = imu_model(options.imu); !imu) return tl::unexpected<core::Error>(imu.error());
   if (auto wheels = odometry_model(options.odometry); !wheels)
     return tl::unexpected<core::Error>(wheels.error());
+  if (auto rig = read_rig(options); !rig) return tl::unexpected<core::Error>(rig.error());
   if ((options.depth_width > 0) != (options.depth_height > 0))
     return core::usage_error("depth_width, depth_height: give both or none");
   if (auto error = camera_error(options.camera_error, 0, options.width); !error)

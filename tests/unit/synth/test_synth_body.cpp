@@ -34,8 +34,8 @@ const SynthSource& walk() {
 TEST(SynthBody, IdealGyroscopeAndAccelerometerIntegrateToTheTruth) {
   const auto readings = imu_readings(walk(), *imu_model("ideal"), 1);
   ASSERT_GT(readings.size(), 2000U);
-  const geometry::Rigid3 camera_from_body = body_from_camera().inverse();
-  const auto body = [&](double stamp) { return walk().motion(stamp).world_from_camera * camera_from_body; };
+  const geometry::Rigid3 camera_from_body = walk().body_from_camera().inverse();
+  const auto body = [&](double stamp) { return walk().motion(stamp, camera_from_body).world_from_frame; };
   Eigen::Matrix3d r = body(readings[0].stamp).rotation;
   Eigen::Vector3d v = walk().motion(readings[0].stamp).velocity;
   double turned = 0.0;
@@ -78,8 +78,8 @@ TEST(SynthBody, ErrorsAreAsLargeAsTheyAreSaidToBe) {
 
 TEST(SynthBody, WheelsMeasureThePathInThePlane) {
   const auto readings = odometry_readings(walk(), *odometry_model("ideal"), 1);
-  const geometry::Rigid3 first = walk().motion(readings.front().stamp).world_from_camera,
-                         last = walk().motion(readings.back().stamp).world_from_camera;
+  const geometry::Rigid3 first = walk().motion(readings.front().stamp).world_from_frame,
+                         last = walk().motion(readings.back().stamp).world_from_frame;
   const auto yaw = [](const geometry::Rigid3& pose) {
     const Eigen::Vector3d ahead = pose.rotation * Eigen::Vector3d::UnitZ();
     return std::atan2(ahead.y(), ahead.x());
@@ -169,6 +169,41 @@ TEST(SynthBody, McapHasThePicturesAndWhatTheBodyMeasured) {
   EXPECT_NEAR(rate[0], wx, 1e-6);
   EXPECT_NEAR(rate[2], wz, 1e-6);
   fs::remove_all(folder);
+}
+
+TEST(SynthBody, CamerasOfARigLookFromTheirPlacesOnOneBody) {
+  const fs::path file =
+      fs::path(::testing::TempDir()) / ("plumbline_rig_" + std::to_string(::getpid()) + ".yaml");
+  std::ofstream(file)
+      << "cameras:\n  - {at: [0.1, 0, 0]}\n  - {at: [-0.1, 0.05, 0.2], yaw: 180 deg, pitch: 10 deg}\n";
+  const core::Executor executor(1);
+  const auto log = core::null_log();
+  const std::string address = "synth:room?frames=4&width=64&height=48&sensor=ideal&rig=" + file.string();
+  const auto front = open_synth(address + "&robot=0", kBodyScenes, executor, *log);
+  const auto back = open_synth(address + "&robot=1", kBodyScenes, executor, *log);
+  ASSERT_TRUE(front && back) << (front ? back.error().message : front.error().message);
+  const auto alone =
+      open_synth("synth:room?frames=4&width=64&height=48&sensor=ideal", kBodyScenes, executor, *log);
+
+  for (std::size_t i = 0; i < 4; ++i) {
+    const geometry::Rigid3 a = (*(*front)->truth())[i].world_from_camera,
+                           b = (*(*back)->truth())[i].world_from_camera,
+                           path = (*(*alone)->truth())[i].world_from_camera;
+    // In the frame of the front camera: x right, y down, z forward.
+    const geometry::Rigid3 front_from_back = a.inverse() * b;
+    EXPECT_LT((front_from_back.translation - Eigen::Vector3d(-0.05, -0.2, -0.2)).norm(), 1e-9);
+    const Eigen::Vector3d ahead = front_from_back.rotation * Eigen::Vector3d::UnitZ();
+    EXPECT_LT((ahead - Eigen::Vector3d(0.0, -std::sin(10 * M_PI / 180), -std::cos(10 * M_PI / 180))).norm(),
+              1e-9);
+    EXPECT_LT((path.inverse() * a.translation - Eigen::Vector3d(0, 0, 0.1)).norm(), 1e-9);
+  }
+
+  EXPECT_FALSE(open_synth(address + "&robot=2", kBodyScenes, executor, *log));
+  std::ofstream(file) << "cameras:\n  - {at: [0.1, 0, 0], yaww: 3 deg}\n";
+  const auto wrong = open_synth(address, kBodyScenes, executor, *log);
+  ASSERT_FALSE(wrong);
+  EXPECT_NE(wrong.error().message.find(":2:"), std::string::npos) << wrong.error().message;
+  fs::remove(file);
 }
 
 }  // namespace
