@@ -52,6 +52,7 @@ std::vector<dataset::ImuReading> imu_readings(const SynthSource& source, const I
     const Vector3d force = motion.world_from_frame.rotation.transpose() * (motion.acceleration - gravity);
     const Vector3d gyro = gyro_axes * motion.turn_rate + gyro_bias + normals(rng, model.gyro_noise * root);
     const Vector3d accel = accel_axes * force + accel_bias + normals(rng, model.accel_noise * root);
+
     gyro_bias += normals(rng, model.gyro_walk * std::sqrt(step));
     accel_bias += normals(rng, model.accel_walk * std::sqrt(step));
     if (rng.chance(model.gaps / 60.0 * step)) silent_until = t + 0.05;
@@ -75,6 +76,7 @@ std::vector<dataset::OdometryReading> odometry_readings(const SynthSource& sourc
     // The wheels turn from this reading to the next.
     const geometry::Rigid3 from = source.motion(t, camera_from_body).world_from_frame,
                            to = source.motion(t + step, camera_from_body).world_from_frame;
+
     const double heading = yaw_of(from), turned = std::remainder(yaw_of(to) - heading, 2.0 * M_PI);
     const Eigen::Rotation2Dd into_body(-(heading + 0.5 * turned));
     if (rng.chance(model.slip / 60.0 * step)) slips_until = t + 0.3;

@@ -187,6 +187,7 @@ nlohmann::json describe_robot(const SynthSource& source, const std::string& fold
   const geometry::Rigid3 start = source.world_from_camera(first.stamp);
   const Eigen::Quaterniond q = start.quaternion();
   const Eigen::Vector3d& t = start.translation;
+
   nlohmann::json json = {
       {"folder", folder},
       {"path", path_name},
@@ -195,10 +196,12 @@ nlohmann::json describe_robot(const SynthSource& source, const std::string& fold
       {"first_stamp", first.stamp},
       {"last_stamp", last.stamp},
       {"start", {{"position_m", {t.x(), t.y(), t.z()}}, {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}}}};
+
   if (!options.camera_error.empty()) {
     json["camera"] = {{"file", describe_camera(source.camera())},
                       {"true", describe_camera(source.true_camera())}};
   }
+
   if (!options.rig.empty()) {
     const Eigen::Quaterniond turn = source.body_from_camera().quaternion();
     const Eigen::Vector3d& place = source.body_from_camera().translation;
@@ -239,6 +242,7 @@ nlohmann::json describe_options(const Scene& scene, const SynthOptions& options)
   core::OptionTable table, defaults;
   given.declare(table);
   usual.declare(defaults);
+
   for (const core::OptionSpec& spec : table.specs()) {
     if (spec.key == "reference_spacing" || json.contains(spec.key) ||
         table.value(spec.key) == defaults.value(spec.key))
@@ -301,6 +305,7 @@ Result<nlohmann::json> write_robots(const std::vector<std::unique_ptr<SynthSourc
   for (std::size_t i = 0; i < sources.size() && !stop.stop_requested(); ++i) {
     const std::string folder = folder_name(static_cast<int>(i));
     const std::size_t before = summary.frames;
+
     const Job job{*sources[i],
                   options,
                   output / folder,
@@ -310,6 +315,7 @@ Result<nlohmann::json> write_robots(const std::vector<std::unique_ptr<SynthSourc
                   [&](std::size_t done, std::size_t) {
                     if (progress) progress(before + done, all_frames);
                   }};
+
     const auto written = write_frames(job, log);
     if (!written) return tl::unexpected<core::Error>(written.error());
     summary.frames += *written;
@@ -388,6 +394,7 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
     for (const auto& source : *sources) visibility.add(*source, executor, stop);
     const auto counts =
         write_reference(output / "reference.ply", **world, visibility, summary.reference_spacing_m, executor);
+
     if (!counts) return fail(counts.error());
     summary.reference_samples = counts->samples;
     summary.reference_visible = counts->visible;

@@ -27,12 +27,14 @@ sensor::Camera make_camera(Sensor sensor, int width, int height, double fps) {
   const double s = std::min(width / 640.0, height / 480.0);
   // Colour cameras 69 degrees across.
   const bool wide = sensor == Sensor::kRealsense || sensor == Sensor::kStereo || sensor == Sensor::kPhone;
+
   camera.color = {width,
                   height,
                   (wide ? 462.0 : 535.4) * s,
                   (wide ? 462.0 : 539.2) * s,
                   0.5 * width + 0.1 * s,
                   0.5 * height + 7.6 * s};
+
   if (sensor == Sensor::kIdeal) camera.color.fx = camera.color.fy = 525.0 * s;
   if (sensor == Sensor::kIdeal) camera.color.cx = 0.5 * (width - 1);
   if (sensor != Sensor::kKinect && sensor != Sensor::kStructured) camera.color.cy = 0.5 * (height - 1);
@@ -227,6 +229,7 @@ cv::Mat2f SynthSource::Impl::flow(const View& view, const Stamps& at, double ext
 cv::Mat3b SynthSource::Impl::rolling(const Stamps& at, const Exposure& exposure) const {
   constexpr int kRows = 8;
   cv::Mat3b image(camera.color.height, camera.color.width);
+
   for (int first = 0; first < image.rows; first += kRows) {
     sensor::Pinhole strip = camera.color;
     strip.height = std::min(kRows, image.rows - first);
@@ -236,6 +239,7 @@ cv::Mat3b SynthSource::Impl::rolling(const Stamps& at, const Exposure& exposure)
     View view = look(*world, strip, pose(stamp), stamp - kFirstStamp);
     view.first_row = first;
     view.picture_rows = image.rows;
+
     cv::Mat3b rows = shade(*world, view, {exposure.gain * row_gain(at, stamp), exposure.vignette});
     for (int y = 0; color_faults.flicker > 0.0 && y < rows.rows; ++y) {
       const double row_stamp = stamp + (y + 0.5 - 0.5 * rows.rows) / image.rows * world->options.readout_s;
@@ -260,6 +264,7 @@ cv::Mat3b SynthSource::Impl::color(const Stamps& at) const {
                         : shade(*world, view, {exposure.gain * row_gain(at, at.color), exposure.vignette});
   const double blur = event(EventKind::kBlur, at.color);
   const bool moves = color_faults.motion_blur > 0.0;
+
   if (real) {
     cv::GaussianBlur(image, image, {3, 3}, 0.6);  // lens and mosaic
     image = motion_blur(image, flow(view, at, blur));
@@ -293,6 +298,7 @@ core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_p
   impl->world = world;
   impl->robot = robot;
   impl->name = recordings(o) > 1 ? fmt::format("{}-robot{}", world->scene.name, robot) : world->scene.name;
+
   impl->camera = make_camera(o.sensor, o.width, o.height, o.fps);
   impl->camera.readout_s = o.readout_s;
   impl->camera.depth_delay_s = o.depth_delay_s;
@@ -300,12 +306,14 @@ core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_p
     impl->camera.depth = impl->camera.color.resized(depth.width, depth.height);
     impl->camera.color_from_depth = Rigid3();
   }
+
   auto told = told_camera(o, robot, impl->camera);
   if (!told) return tl::unexpected<core::Error>(told.error());
   impl->told = std::move(*told);
   impl->images = impl->told.color;
   impl->body_from_camera =
       o.rig.empty() ? synth::body_from_camera() : (*read_rig(o))[static_cast<std::size_t>(robot)];
+
   impl->faults = *depth_faults(o.depth_faults);
   impl->color_faults = *color_faults(o.color_faults);
   if (!o.camera_error.empty() || impl->camera.depth)

@@ -27,9 +27,11 @@ LensMarks::LensMarks(const ColorFaults& faults, const cv::Size& size, std::uint6
 
   if (faults.specks > 0.0) {
     light_ = cv::Mat1f(size, 1.0F);
+
     for (int i = 0; i < 12; ++i) {
       const double cx = rng.uniform(0.0, size.width), cy = rng.uniform(0.0, size.height);
       const double radius = unit * rng.uniform(8.0, 40.0);
+
       for (int y = 0; y < size.height; ++y) {
         for (int x = 0; x < size.width; ++x) {
           const double far = ((x - cx) * (x - cx) + (y - cy) * (y - cy)) / (radius * radius);
@@ -42,6 +44,7 @@ LensMarks::LensMarks(const ColorFaults& faults, const cv::Size& size, std::uint6
   if (faults.dots > 0.0) {
     dots_ = cv::Mat1f::zeros(size);
     const double pitch = std::max(4.0, 14.0 * unit);
+
     for (double top = 0.0; top < size.height; top += pitch) {
       for (double left = 0.0; left < size.width; left += pitch) {
         const int x = static_cast<int>(left + rng.uniform(0.0, pitch)),

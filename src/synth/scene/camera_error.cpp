@@ -37,6 +37,7 @@ core::Result<CameraError> camera_error(const std::string& text, int robot, int w
   CameraError e;
   const core::Range<double> share{-0.3, 0.3}, pixels{-1000.0, 1000.0}, lens{-1.0, 1.0}, slope{-0.2, 0.2},
       time{-0.1, 0.1};
+
   const auto read = read_settings("camera_error", text,
                                   {{"fx", &e.fx, share, "ratio"},
                                    {"fy", &e.fy, share, "ratio"},
@@ -51,6 +52,7 @@ core::Result<CameraError> camera_error(const std::string& text, int robot, int w
                                    {"slope_y", &e.slope_y, slope, ""},
                                    {"readout", &e.readout, time, "s"},
                                    {"delay", &e.delay, time, "s"}});
+
   if (!read) return tl::unexpected<core::Error>(read.error());
   return e;
 }

@@ -60,6 +60,7 @@ core::Result<ImuModel> imu_model(const std::string& given) {
   ImuModel m;
   if (is_ideal(text)) m = {200.0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
   const core::Range<double> some{0.0, 10.0};
+
   const auto read = read_settings("imu", text,
                                   {{"rate", &m.rate, {10.0, 2000.0}, "Hz"},
                                    {"gyro_noise", &m.gyro_noise, some, ""},
@@ -72,6 +73,7 @@ core::Result<ImuModel> imu_model(const std::string& given) {
                                    {"misalign", &m.misalign, {0.0, 0.3}, "rad"},
                                    {"delay", &m.delay, {-0.5, 0.5}, "s"},
                                    {"gaps", &m.gaps, {0.0, 1000.0}, ""}});
+
   if (!read) return tl::unexpected<core::Error>(read.error());
   return m;
 }

@@ -16,6 +16,7 @@ core::Result<void> read_settings(const std::string& option, const std::string& t
   map.kind = core::ConfigNode::Kind::kMap;
   std::istringstream pieces(text);
   std::string piece;
+
   while (std::getline(pieces, piece, ',')) {
     const auto trim = [](const std::string& s) {
       const auto first = s.find_first_not_of(' ');

@@ -57,10 +57,12 @@ std::string message_definition(const std::string& type) {
            part("geometry_msgs/Transform", kTransform) + part("geometry_msgs/Vector3", kVector3) +
            part("geometry_msgs/Quaternion", kQuaternion);
   }
+
   if (type == "sensor_msgs/msg/Imu") {
     return with_header(kImu) + part("geometry_msgs/Quaternion", kQuaternion) +
            part("geometry_msgs/Vector3", kVector3);
   }
+
   if (type == "nav_msgs/msg/Odometry") {
     return with_header(kOdometry) + part("geometry_msgs/PoseWithCovariance", kPoseCovariance) +
            part("geometry_msgs/Pose", kPose) + part("geometry_msgs/Point", kPoint) +
