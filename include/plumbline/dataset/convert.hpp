@@ -8,12 +8,15 @@
 
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/log.hpp"
+#include "plumbline/dataset/body_readings.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 
 namespace plumbline::dataset {
 
 struct ConvertOptions {
-  bool replace = false;        ///< an earlier copy
+  bool replace = false;  ///< an earlier copy
+  /// Written to MCAP files as /imu (sensor_msgs/Imu), /odom (nav_msgs/Odometry) and /tf_static.
+  const BodyReadings* body = nullptr;
   std::function<bool()> stop;  ///< called before each frame: true ends the copy there; may be empty
   std::function<void(std::size_t)> progress;  ///< frames written so far; may be empty
 };

@@ -11,7 +11,7 @@
 namespace plumbline::synth {
 
 enum class Texture { kFull, kWeak, kNone };
-enum class Sensor { kIdeal, kKinect, kRealsense };
+enum class Sensor { kIdeal, kKinect, kRealsense, kTof, kStructured, kStereo, kPhone };
 enum class Motion { kScene, kHandheld, kWheeled };                  ///< kScene: as the scene file says
 enum class Route { kScene, kTour, kLaps, kWander, kThereAndBack };  ///< kScene: as the file says, else a tour
 
@@ -37,6 +37,20 @@ struct SynthOptions {
   /// to those of the scene. Kinds: whiteout, lampoff, blur (value px, default 8), drop, cover, spin (value
   /// turns, default 1: pure rotation on the spot), nodepth. Example: "whiteout@3+1,blur@6+0.5*12".
   std::string events;
+  /// The recording's camera file is wrong: a seed, from which errors are drawn, or differences from the
+  /// truth, "fx=1.5%,cx=3,k1=0.03,slope=0.02,readout=10ms,delay=15ms"; "": it is right. Pictures do not
+  /// change.
+  std::string camera_error;
+  /// Faults of depth, "offset=0.01,scale=1%,holes,mirrors"; a name alone has its usual strength.
+  std::string depth_faults;
+  std::string color_faults;  ///< of colour, "hunting,flicker=100" likewise
+  int depth_width = 0;       ///< of depth images, registered to colour; 0: as colour, or 256 x 192 of a phone
+  int depth_height = 0;
+  std::string imu;       ///< write imu.csv: "ideal" or "usual", and settings, "usual,delay=5ms"; "": none
+  std::string odometry;  ///< write odometry.csv, likewise
+  std::string rig;       ///< YAML file of several cameras on one body, each a recording; "": one
+  bool mcap = false;     ///< write each recording as an MCAP file instead of a folder of pictures
+  bool moving_masks = false;  ///< write moving/: pictures of what moves
 
   void declare(core::OptionTable& table);
 };
@@ -63,5 +77,6 @@ const char* to_string(Texture texture);
 const char* to_string(Sensor sensor);
 const char* to_string(Motion motion);
 const char* to_string(Route route);
+const char* to_string(EventKind kind);
 
 }  // namespace plumbline::synth

@@ -32,7 +32,9 @@ using Progress = std::function<void(std::size_t, std::size_t)>;
 ///   OUT/robot0/ ...       TUM layout: rgb/ (8-bit PNG), depth/ (16-bit PNG, 5000 per metre), rgb.txt,
 ///   depth.txt,
 ///                         associations.txt, groundtruth.txt (exact world_from_camera at colour and depth
-///                         stamps), camera.yaml
+///                         stamps), camera.yaml; with SynthOptions::camera_error camera.true.yaml;
+///                         truth.csv: pose, velocity (world), turn rate (camera), share of the picture that
+///                         moves, events, of each frame; events.csv if there are any; moving/ if asked
 ///   OUT/reference.ply     binary PLY, samples of the true surfaces in the frame of groundtruth.txt:
 ///                         float x y z, float nx ny nz, uchar red green blue, uchar visible.
 ///                         visible = 1 when some camera saw that spot within the sensor's range and at no

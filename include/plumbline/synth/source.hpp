@@ -26,6 +26,14 @@ struct ExactFrame {
   cv::Mat face;   ///< CV_32SC1, index into Scene::faces, beyond them: a walker's, -1 = nothing hit
 };
 
+/// Motion of the camera, or of a frame that is fixed to it, at one moment.
+struct PathMotion {
+  geometry::Rigid3 world_from_frame;
+  Eigen::Vector3d velocity;      ///< m/s, world
+  Eigen::Vector3d acceleration;  ///< m/s^2, world, without gravity
+  Eigen::Vector3d turn_rate;     ///< rad/s, in that frame
+};
+
 class SynthSource final : public dataset::FrameSource {
  public:
   /// Robot `robot` (from 0) of the scene. Errors: no frames, path through a solid (names the segment and the
@@ -35,15 +43,33 @@ class SynthSource final : public dataset::FrameSource {
 
   [[nodiscard]] const std::string& name() const override;
   [[nodiscard]] const std::string& format() const override;
+  /// As the recording's file describes it (SynthOptions::camera_error).
   [[nodiscard]] const sensor::Camera& camera() const override;
+  [[nodiscard]] const sensor::Camera& true_camera() const;
   [[nodiscard]] std::size_t size() const override;
   [[nodiscard]] dataset::PairInfo info(std::size_t index) const override;
+  /// With the time at which depth really was taken.
+  [[nodiscard]] dataset::PairInfo true_info(std::size_t index) const;
   [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override;
+  /// As the sensors give them, not rectified.
+  [[nodiscard]] core::Result<dataset::StoredPair> stored(std::size_t index) const override;
+  /// Null if the camera's file is right.
+  [[nodiscard]] std::unique_ptr<dataset::FrameSource> taken_by(const sensor::Camera& better) const override;
   /// Exact poses at the colour stamps, in the frame of the scene file.
   [[nodiscard]] std::optional<geometry::Trajectory> truth() const override;
 
   /// Exact pose at any time between first and last stamp (clamped to them).
   [[nodiscard]] geometry::Rigid3 world_from_camera(double stamp) const;
+  /// At any time; outside of the recording the path goes on. `camera_from_frame`: whose motion it is.
+  [[nodiscard]] PathMotion motion(double stamp, const geometry::Rigid3& camera_from_frame = {}) const;
+  /// Pose of the camera on its body, whose x is forward and z up.
+  [[nodiscard]] const geometry::Rigid3& body_from_camera() const;
+  /// Time of the first frame without jitter, from which events count.
+  [[nodiscard]] double start() const;
+  [[nodiscard]] const std::vector<Event>& events() const;
+  /// CV_8UC1, 255 where the colour picture shows something that moves; empty if the world has nothing that
+  /// does.
+  [[nodiscard]] cv::Mat1b moving(std::size_t index) const;
   [[nodiscard]] ExactFrame exact(std::size_t index) const;
   /// True if an event blinds the depth sensor in this frame (covered camera, no depth).
   [[nodiscard]] bool blind(std::size_t index) const;

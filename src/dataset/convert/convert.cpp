@@ -217,7 +217,8 @@ core::Result<ConvertSummary> convert_recording(const FrameSource& source, const 
   fs::path folder = out.has_filename() ? out : out.parent_path();  // where it is first written
   folder += ".partial";
   if (auto free = check_place(out, folder, file, options.replace); !free) return tl::unexpected(free.error());
-  auto target = file ? make_mcap_target(out, source.camera(), log) : make_tum_target(folder, source.camera());
+  auto target = file ? make_mcap_target(out, source.camera(), options.body, log)
+                     : make_tum_target(folder, source.camera());
   if (!target) return tl::unexpected(target.error());
 
   auto summary = copy_frames(source, **target, options, log);

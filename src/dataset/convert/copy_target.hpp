@@ -8,6 +8,7 @@
 #include "bags/bag_writer.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/log.hpp"
+#include "plumbline/dataset/body_readings.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 
 namespace plumbline::dataset {
@@ -29,12 +30,14 @@ class CopyTarget {
 core::Result<std::unique_ptr<CopyTarget>> make_tum_target(const std::filesystem::path& folder,
                                                           const sensor::Camera& camera);
 core::Result<std::unique_ptr<CopyTarget>> make_mcap_target(const std::filesystem::path& file,
-                                                           const sensor::Camera& camera, core::Log& log);
+                                                           const sensor::Camera& camera,
+                                                           const BodyReadings* body, core::Log& log);
 
 /// Messages into any bag. `standard_depth`: depth in other units than millimetres is written in metres, for
-/// readers without the camera file, and without a warning.
+/// readers without the camera file, and without a warning. `body` may be null, and outlives the target.
 std::unique_ptr<CopyTarget> make_message_target(std::unique_ptr<BagWriter> bag, const sensor::Camera& camera,
-                                                bool standard_depth, core::Log& log);
+                                                bool standard_depth, const BodyReadings* body,
+                                                core::Log& log);
 
 /// Stamp in nanoseconds, rounded to whole microseconds if that is the same time: a double that counts seconds
 /// since 1970 resolves no more.

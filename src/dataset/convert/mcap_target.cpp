@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -17,6 +18,68 @@ constexpr double kMillimetresOfMetre = 1000.0;
 const char* const kColorTopic = "/camera/color";
 const char* const kColorFrame = "camera_color_optical_frame";
 const char* const kDepthFrame = "camera_depth_optical_frame";
+const char* const kBodyFrame = "base_link";
+
+/// A message's bytes as CDR, little endian.
+class CdrText {
+ public:
+  CdrText(double stamp, const std::string& frame) {
+    const std::int64_t ns = nanoseconds(stamp);
+    number(static_cast<std::int32_t>(ns / 1000000000));
+    number(static_cast<std::uint32_t>(ns % 1000000000));
+    text(frame);
+  }
+  template <typename T>
+  void number(T value) {
+    while ((bytes_.size() - kHead) % sizeof value != 0) bytes_.push_back(0);
+    const auto* from = reinterpret_cast<const std::uint8_t*>(&value);
+    bytes_.insert(bytes_.end(), from, from + sizeof value);
+  }
+  void text(const std::string& value) {
+    number(static_cast<std::uint32_t>(value.size() + 1));
+    bytes_.insert(bytes_.end(), value.begin(), value.end());
+    bytes_.push_back(0);
+  }
+  void vector(const Eigen::Vector3d& v) {
+    for (const double x : v) number(x);
+  }
+  void rotation(const Eigen::Quaterniond& q) {
+    for (const double x : {q.x(), q.y(), q.z(), q.w()}) number(x);
+  }
+  void zeros(int count) {
+    for (int i = 0; i < count; ++i) number(0.0);
+  }
+  [[nodiscard]] const Bytes& bytes() const { return bytes_; }
+
+ private:
+  static constexpr std::size_t kHead = 4;
+  Bytes bytes_{0, 1, 0, 0};
+};
+
+/// No orientation is known: its covariance begins with -1. Other covariances of 0 are not known.
+Bytes imu_message(const ImuReading& reading) {
+  CdrText cdr(reading.stamp, kBodyFrame);
+  cdr.rotation(Eigen::Quaterniond::Identity());
+  cdr.number(-1.0);
+  cdr.zeros(8);
+  cdr.vector(reading.turn_rate);
+  cdr.zeros(9);
+  cdr.vector(reading.acceleration);
+  cdr.zeros(9);
+  return cdr.bytes();
+}
+
+Bytes odometry_message(const OdometryReading& reading) {
+  CdrText cdr(reading.stamp, "odom");
+  cdr.text(kBodyFrame);
+  cdr.vector(reading.odom_from_body.translation);
+  cdr.rotation(reading.odom_from_body.quaternion());
+  cdr.zeros(36);
+  cdr.vector(reading.velocity);
+  cdr.vector({0.0, 0.0, reading.turn_rate});
+  cdr.zeros(36);
+  return cdr.bytes();
+}
 
 std::string encoding_of_pixels(const cv::Mat& image) {
   switch (image.type()) {
@@ -68,14 +131,20 @@ CameraInfoMessage info_of(const sensor::Pinhole& camera, const sensor::Lens& len
 
 class McapTarget final : public CopyTarget {
  public:
-  McapTarget(std::unique_ptr<BagWriter> bag, sensor::Camera camera, bool standard_depth, core::Log& log)
-      : bag_(std::move(bag)), camera_(std::move(camera)), standard_depth_(standard_depth), log_(log) {
+  McapTarget(std::unique_ptr<BagWriter> bag, sensor::Camera camera, bool standard_depth,
+             const BodyReadings* body, core::Log& log)
+      : bag_(std::move(bag)),
+        camera_(std::move(camera)),
+        standard_depth_(standard_depth),
+        body_(body),
+        log_(log) {
     own_depth_camera_ = camera_.color_from_depth && camera_.depth;
     depth_topic_ = own_depth_camera_ ? "/camera/depth" : "/camera/aligned_depth_to_color";
   }
 
   core::Result<void> add(std::int64_t color_ns, std::int64_t depth_ns, const StoredPair& pair) override {
     if (!begun_) begin(color_ns);
+    write_readings(color_ns);
 
     const MessageHeader header{color_ns, kColorFrame};
     const auto size = write_color(header, pair.color);
@@ -93,6 +162,7 @@ class McapTarget final : public CopyTarget {
   }
 
   core::Result<void> finish(const std::optional<geometry::Trajectory>& /*truth*/) override {
+    write_readings(std::numeric_limits<std::int64_t>::max());
     bag_->write_camera_yaml(sensor::to_yaml(camera_));
     return bag_->finish();
   }
@@ -100,8 +170,25 @@ class McapTarget final : public CopyTarget {
  private:
   void begin(std::int64_t stamp_ns) {
     begun_ = true;
-    if (!own_depth_camera_) return;
-    bag_->write("/tf_static", {{kColorFrame, kDepthFrame, *camera_.color_from_depth}}, stamp_ns);
+    std::vector<TransformMessage> fixed;
+    if (own_depth_camera_) fixed.push_back({kColorFrame, kDepthFrame, *camera_.color_from_depth});
+    if (body_ != nullptr) fixed.push_back({kBodyFrame, kColorFrame, body_->body_from_camera});
+    if (!fixed.empty()) bag_->write("/tf_static", fixed, stamp_ns);
+  }
+
+  /// Writes what the body measured up to a time.
+  void write_readings(std::int64_t until_ns) {
+    if (body_ == nullptr) return;
+    for (; imu_ < body_->imu.size() && nanoseconds(body_->imu[imu_].stamp) <= until_ns; ++imu_) {
+      const ImuReading& reading = body_->imu[imu_];
+      bag_->write_bytes("/imu", "sensor_msgs/msg/Imu", nanoseconds(reading.stamp), imu_message(reading));
+    }
+    for (; odometry_ < body_->odometry.size() && nanoseconds(body_->odometry[odometry_].stamp) <= until_ns;
+         ++odometry_) {
+      const OdometryReading& reading = body_->odometry[odometry_];
+      bag_->write_bytes("/odom", "nav_msgs/msg/Odometry", nanoseconds(reading.stamp),
+                        odometry_message(reading));
+    }
   }
 
   /// Writes JPEG unchanged, everything else as pixels; returns the image's size.
@@ -156,6 +243,8 @@ class McapTarget final : public CopyTarget {
   std::unique_ptr<BagWriter> bag_;
   sensor::Camera camera_;
   bool standard_depth_;
+  const BodyReadings* body_;
+  std::size_t imu_ = 0, odometry_ = 0;  ///< next to be written
   core::Log& log_;
   std::string depth_topic_;
   bool own_depth_camera_ = false;
@@ -166,15 +255,17 @@ class McapTarget final : public CopyTarget {
 }  // namespace
 
 core::Result<std::unique_ptr<CopyTarget>> make_mcap_target(const std::filesystem::path& file,
-                                                           const sensor::Camera& camera, core::Log& log) {
+                                                           const sensor::Camera& camera,
+                                                           const BodyReadings* body, core::Log& log) {
   const auto& part = core::part<BagReaders>();
   if (!part) return tl::unexpected(part.error());
-  return make_message_target((*part)->create_mcap(file, kCopyMaker), camera, false, log);
+  return make_message_target((*part)->create_mcap(file, kCopyMaker), camera, false, body, log);
 }
 
 std::unique_ptr<CopyTarget> make_message_target(std::unique_ptr<BagWriter> bag, const sensor::Camera& camera,
-                                                bool standard_depth, core::Log& log) {
-  return std::make_unique<McapTarget>(std::move(bag), camera, standard_depth, log);
+                                                bool standard_depth, const BodyReadings* body,
+                                                core::Log& log) {
+  return std::make_unique<McapTarget>(std::move(bag), camera, standard_depth, body, log);
 }
 
 }  // namespace plumbline::dataset

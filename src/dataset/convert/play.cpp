@@ -88,7 +88,7 @@ class Player {
       : source_(source), sink_(sink), options_(options), log_(log) {
     auto writer = std::make_unique<SinkWriter>(sink, encoder);
     writer_ = writer.get();
-    target_ = make_message_target(std::move(writer), source.camera(), true, log);
+    target_ = make_message_target(std::move(writer), source.camera(), true, nullptr, log);
     std::vector<PairInfo> infos;
     for (std::size_t i = 0; i < source.size(); ++i) infos.push_back(source.info(i));
     step_s_ = 1.0 / usual_fps(infos);

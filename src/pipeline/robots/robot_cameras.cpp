@@ -34,8 +34,8 @@ RobotCameras::RobotCameras(RobotRecordings& recordings, bool refine, BeginSlam b
       log_(context.log),
       choices_(recordings.robots().size()),
       robots_(recordings.robots()) {
-  // Generated recordings have no lens, and no error.
-  asked_ = recordings.format() == "synth";
+  // Generated recordings have no lens, and no error but on request.
+  asked_ = recordings.format() == "synth" && recordings.taken_by(0, recordings.robot(0).camera) == nullptr;
   refine_ = refine && !asked_;
   for (const RobotInfo& robot : robots_) cameras_.emplace_back(robot);
 }

@@ -32,6 +32,11 @@ class SelectedFrames : public dataset::FrameSource {
     return frame;
   }
   [[nodiscard]] std::optional<geometry::Trajectory> truth() const override { return source_->truth(); }
+  [[nodiscard]] std::unique_ptr<FrameSource> taken_by(const sensor::Camera& better) const override {
+    auto source = source_->taken_by(better);
+    if (source == nullptr) return nullptr;
+    return std::make_unique<SelectedFrames>(std::move(source), indices_);
+  }
 
  private:
   std::unique_ptr<dataset::FrameSource> source_;

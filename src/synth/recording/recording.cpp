@@ -11,8 +11,13 @@
 #include "plumbline/core/version.hpp"
 #include "plumbline/dataset/image_io.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
+#include "recording/body_sensors.hpp"
+#include "recording/mcap_film.hpp"
 #include "recording/plan_file.hpp"
 #include "recording/reference.hpp"
+#include "recording/truth_files.hpp"
+#include "scene/random.hpp"
+#include "scene/rig.hpp"
 
 namespace plumbline::synth {
 
@@ -28,25 +33,37 @@ std::string depth_name(const dataset::PairInfo& info) {
 
 /// With the stamps that the files have.
 dataset::PairInfo labelled(const SynthSource& source, std::size_t index) {
-  dataset::PairInfo info = source.info(index);
-  info.depth_stamp -= source.camera().depth_delay_s;
+  dataset::PairInfo info = source.true_info(index);
+  info.depth_stamp -= source.true_camera().depth_delay_s;
   return info;
+}
+
+/// Share of a colour picture that moves; its mask is written if asked.
+Result<double> write_moving(const SynthSource& source, std::size_t index, const fs::path& folder, bool mask) {
+  cv::Mat1b moves = source.moving(index);
+  const double share = moves.empty() ? 0.0 : cv::countNonZero(moves) / static_cast<double>(moves.total());
+  if (!mask) return share;
+  const sensor::Pinhole& size = source.camera().color;
+  if (moves.empty()) moves = cv::Mat1b::zeros(size.height, size.width);
+  const std::string name = color_name(labelled(source, index)).substr(4);
+  if (auto ok = dataset::write_png(folder / "moving" / name, moves); !ok)
+    return tl::unexpected<core::Error>(ok.error());
+  return share;
 }
 
 /// Writes one pair; "" or what went wrong.
 std::string write_pair(const SynthSource& source, std::size_t index, const fs::path& folder) {
-  const auto frame = source.read(index);
-  if (!frame) return frame.error().message;
+  const auto pair = source.stored(index);
+  if (!pair) return pair.error().message;
   const dataset::PairInfo info = labelled(source, index);
-  cv::Mat raw;
-  frame->depth.convertTo(raw, CV_16U, source.camera().depth_scale);
-  auto written = dataset::write_png(folder / color_name(info), frame->color);
-  if (written) written = dataset::write_png(folder / depth_name(info), raw);
+  auto written = dataset::write_png(folder / color_name(info), pair->color.pixels);
+  if (written) written = dataset::write_png(folder / depth_name(info), pair->depth.pixels);
   return written ? "" : written.error().message;
 }
 
 /// Lists, truth and camera of the first `frames` pairs.
-Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs::path& folder) {
+Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs::path& folder,
+                         bool pictures) {
   std::string color = "# timestamp filename\n", depth = color, pairs;
   geometry::Trajectory truth;
 
@@ -57,15 +74,17 @@ Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs
     pairs += fmt::format("{:.6f} {} {:.6f} {}\n", info.stamp, color_name(info), info.depth_stamp,
                          depth_name(info));
     truth.push_back({info.stamp, source.world_from_camera(info.stamp)});
-    const double depth_taken = source.info(i).depth_stamp;
+    const double depth_taken = source.true_info(i).depth_stamp;
     if (depth_taken != info.stamp) truth.push_back({depth_taken, source.world_from_camera(depth_taken)});
   }
 
   std::sort(truth.begin(), truth.end(),
             [](const geometry::StampedPose& a, const geometry::StampedPose& b) { return a.stamp < b.stamp; });
-  if (auto ok = core::write_file(folder / "rgb.txt", color); !ok) return ok;
-  if (auto ok = core::write_file(folder / "depth.txt", depth); !ok) return ok;
-  if (auto ok = core::write_file(folder / "associations.txt", pairs); !ok) return ok;
+  if (pictures) {
+    if (auto ok = core::write_file(folder / "rgb.txt", color); !ok) return ok;
+    if (auto ok = core::write_file(folder / "depth.txt", depth); !ok) return ok;
+    if (auto ok = core::write_file(folder / "associations.txt", pairs); !ok) return ok;
+  }
   if (auto ok = core::write_file(folder / "camera.yaml", sensor::to_yaml(source.camera())); !ok) return ok;
 
   return dataset::write_trajectory(folder / "groundtruth.txt", truth);
@@ -74,45 +93,102 @@ Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs
 /// State of one robot's recording.
 struct Job {
   const SynthSource& source;
+  const SynthOptions& options;
   fs::path folder;
-  std::size_t done_before;  ///< frames of the robots before
-  std::size_t all_frames;
+  std::uint64_t seed;
+  const core::Executor& executor;
+  const core::StopToken& stop;
+  Progress progress;  ///< frames of this recording, and all of them
 };
 
-/// Returns the number of frames written; smaller than the total if stopped.
-Result<std::size_t> write_frames(const Job& job, const core::Executor& executor, const core::StopToken& stop,
-                                 const Progress& progress) {
-  for (const char* sub : {"rgb", "depth"}) {
-    if (auto ok = core::make_folder(job.folder / sub); !ok) return tl::unexpected<core::Error>(ok.error());
-  }
-
-  const std::size_t batch = static_cast<std::size_t>(executor.threads()) * 4;
+/// Writes pictures; returns the number of frames, smaller than the total if stopped.
+Result<std::size_t> write_pictures(const Job& job) {
+  const std::size_t batch = static_cast<std::size_t>(job.executor.threads()) * 4;
   std::size_t done = 0;
 
-  while (done < job.source.size() && !stop.stop_requested()) {
+  while (done < job.source.size() && !job.stop.stop_requested()) {
     const std::size_t count = std::min(batch, job.source.size() - done);
     std::vector<std::string> problems(count);
-    executor.parallel_for(count,
-                          [&](std::size_t i) { problems[i] = write_pair(job.source, done + i, job.folder); });
+    job.executor.parallel_for(
+        count, [&](std::size_t i) { problems[i] = write_pair(job.source, done + i, job.folder); });
     for (const std::string& problem : problems) {
       if (!problem.empty()) return core::output_error(problem);
     }
     done += count;
-    if (progress) progress(job.done_before + done, job.all_frames);
+    job.progress(done, job.source.size());
   }
 
-  if (auto ok = write_lists(job.source, done, job.folder); !ok)
-    return tl::unexpected<core::Error>(ok.error());
   return done;
 }
 
+/// Truth beside the first `frames` frames.
+Result<void> write_truth(const Job& job, std::size_t frames) {
+  std::vector<Result<double>> shares(frames, 0.0);
+  job.executor.parallel_for(frames, [&](std::size_t i) {
+    shares[i] = write_moving(job.source, i, job.folder, job.options.moving_masks);
+  });
+  std::vector<double> moving;
+  for (const auto& share : shares) {
+    if (!share) return tl::unexpected<core::Error>(share.error());
+    moving.push_back(*share);
+  }
+
+  auto ok = write_lists(job.source, frames, job.folder, !job.options.mcap);
+  if (ok) ok = core::write_file(job.folder / "truth.csv", describe_truth(job.source, moving));
+  if (ok && !job.source.events().empty())
+    ok = core::write_file(job.folder / "events.csv", describe_events(job.source));
+  if (ok && !job.options.camera_error.empty())
+    ok = core::write_file(job.folder / "camera.true.yaml", sensor::to_yaml(job.source.true_camera()));
+  return ok;
+}
+
+/// Returns the number of frames written; smaller than the total if stopped.
+Result<std::size_t> write_frames(const Job& job, core::Log& log) {
+  auto ok = core::make_folder(job.folder);
+  for (const auto& [sub, wanted] :
+       {std::pair("rgb", !job.options.mcap), std::pair("depth", !job.options.mcap),
+        std::pair("moving", job.options.moving_masks)}) {
+    if (ok && wanted) ok = core::make_folder(job.folder / sub);
+  }
+  if (!ok) return tl::unexpected<core::Error>(ok.error());
+
+  dataset::BodyReadings body;
+  body.body_from_camera = job.source.body_from_camera();
+  if (!job.options.imu.empty()) body.imu = imu_readings(job.source, *imu_model(job.options.imu), job.seed);
+  if (!job.options.odometry.empty())
+    body.odometry = odometry_readings(job.source, *odometry_model(job.options.odometry), job.seed);
+  if (!body.imu.empty()) ok = core::write_file(job.folder / "imu.csv", describe_imu(body.imu));
+  if (ok && !body.odometry.empty())
+    ok = core::write_file(job.folder / "odometry.csv", describe_odometry(body.odometry));
+  if (!ok) return tl::unexpected<core::Error>(ok.error());
+
+  const auto done = job.options.mcap ? write_mcap(job.source, job.folder / "recording.mcap", &body,
+                                                  job.executor, job.stop, job.progress, log)
+                                     : write_pictures(job);
+  if (!done) return done;
+  if (ok = write_truth(job, *done); !ok) return tl::unexpected<core::Error>(ok.error());
+  return done;
+}
+
+nlohmann::json describe_camera(const sensor::Camera& c) {
+  return {{"fx", c.color.fx},
+          {"fy", c.color.fy},
+          {"cx", c.color.cx},
+          {"cy", c.color.cy},
+          {"distortion", std::vector<double>(c.distortion.begin(), c.distortion.begin() + 5)},
+          {"depth_slope", c.depth_slope},
+          {"readout", c.readout_s.value_or(0.0)},
+          {"depth_delay", c.depth_delay_s}};
+}
+
 nlohmann::json describe_robot(const SynthSource& source, const std::string& folder,
-                              const std::string& path_name, std::size_t frames) {
+                              const std::string& path_name, std::size_t frames, const SynthOptions& options) {
   const auto first = source.info(0), last = source.info(source.size() - 1);
   const geometry::Rigid3 start = source.world_from_camera(first.stamp);
   const Eigen::Quaterniond q = start.quaternion();
   const Eigen::Vector3d& t = start.translation;
-  return {
+
+  nlohmann::json json = {
       {"folder", folder},
       {"path", path_name},
       {"frames", frames},
@@ -120,6 +196,19 @@ nlohmann::json describe_robot(const SynthSource& source, const std::string& fold
       {"first_stamp", first.stamp},
       {"last_stamp", last.stamp},
       {"start", {{"position_m", {t.x(), t.y(), t.z()}}, {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}}}};
+
+  if (!options.camera_error.empty()) {
+    json["camera"] = {{"file", describe_camera(source.camera())},
+                      {"true", describe_camera(source.true_camera())}};
+  }
+
+  if (!options.rig.empty()) {
+    const Eigen::Quaterniond turn = source.body_from_camera().quaternion();
+    const Eigen::Vector3d& place = source.body_from_camera().translation;
+    json["body_from_camera"] = {{"position_m", {place.x(), place.y(), place.z()}},
+                                {"quaternion_xyzw", {turn.x(), turn.y(), turn.z(), turn.w()}}};
+  }
+  return json;
 }
 
 nlohmann::json describe_options(const SynthOptions& o) {
@@ -140,12 +229,26 @@ nlohmann::json describe_options(const SynthOptions& o) {
           {"events", o.events}};
 }
 
-/// With the options that only worlds made from a number have.
+/// With the options that not all worlds have.
 nlohmann::json describe_options(const Scene& scene, const SynthOptions& options) {
   nlohmann::json json = describe_options(options);
   if (scene.plan) {
     json["layout"] = options.layout;
     json["path"] = to_string(options.path);
+  }
+
+  // Newer options are there only if they are used.
+  SynthOptions given = options, usual;
+  core::OptionTable table, defaults;
+  given.declare(table);
+  usual.declare(defaults);
+
+  for (const core::OptionSpec& spec : table.specs()) {
+    if (spec.key == "reference_spacing" || json.contains(spec.key) ||
+        table.value(spec.key) == defaults.value(spec.key))
+      continue;
+    const auto value = core::parse_yaml(table.value(spec.key), "");
+    if (value) json[spec.key] = value->scalar;
   }
   return json;
 }
@@ -180,7 +283,7 @@ Result<void> check_free(const fs::path& output) {
 
 Result<std::vector<std::unique_ptr<SynthSource>>> open_all(const std::shared_ptr<const World>& world) {
   std::vector<std::unique_ptr<SynthSource>> sources;
-  for (int i = 0; i < world->options.robots; ++i) {
+  for (int i = 0; i < recordings(world->options); ++i) {
     auto source = SynthSource::create(world, i);
     if (!source) return tl::unexpected<core::Error>(source.error());
     sources.push_back(std::move(*source));
@@ -190,9 +293,9 @@ Result<std::vector<std::unique_ptr<SynthSource>>> open_all(const std::shared_ptr
 
 /// Writes the recording of each robot; returns their entries in scene.json.
 Result<nlohmann::json> write_robots(const std::vector<std::unique_ptr<SynthSource>>& sources,
-                                    const Scene& scene, const fs::path& output,
+                                    const Scene& scene, const SynthOptions& options, const fs::path& output,
                                     const core::Executor& executor, const core::StopToken& stop,
-                                    const Progress& progress, WriteSummary& summary) {
+                                    core::Log& log, const Progress& progress, WriteSummary& summary) {
   summary.robots = static_cast<int>(sources.size());
   std::size_t all_frames = 0;
   for (const auto& source : sources) all_frames += source->size();
@@ -201,13 +304,25 @@ Result<nlohmann::json> write_robots(const std::vector<std::unique_ptr<SynthSourc
 
   for (std::size_t i = 0; i < sources.size() && !stop.stop_requested(); ++i) {
     const std::string folder = folder_name(static_cast<int>(i));
-    const auto written =
-        write_frames({*sources[i], output / folder, summary.frames, all_frames}, executor, stop, progress);
+    const std::size_t before = summary.frames;
+
+    const Job job{*sources[i],
+                  options,
+                  output / folder,
+                  mix(static_cast<std::uint64_t>(options.seed), options.rig.empty() ? i + 1 : 1),
+                  executor,
+                  stop,
+                  [&](std::size_t done, std::size_t) {
+                    if (progress) progress(before + done, all_frames);
+                  }};
+
+    const auto written = write_frames(job, log);
     if (!written) return tl::unexpected<core::Error>(written.error());
     summary.frames += *written;
     summary.path_m += sources[i]->path_length();
-    robots.push_back(
-        describe_robot(*sources[i], folder, scene.robots[i % scene.robots.size()].name, *written));
+    robots.push_back(describe_robot(*sources[i], folder,
+                                    scene.robots[options.rig.empty() ? i % scene.robots.size() : 0].name,
+                                    *written, options));
   }
 
   summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -268,7 +383,7 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
   if (auto ok = core::make_folder(output); !ok) return fail(ok.error());
 
   WriteSummary summary;
-  const auto robots = write_robots(*sources, scene, output, executor, stop, progress, summary);
+  const auto robots = write_robots(*sources, scene, options, output, executor, stop, log, progress, summary);
   if (!robots) return fail(robots.error());
   summary.reference_spacing_m =
       options.reference_spacing > 0.0 ? options.reference_spacing : default_spacing(scene);
@@ -279,6 +394,7 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
     for (const auto& source : *sources) visibility.add(*source, executor, stop);
     const auto counts =
         write_reference(output / "reference.ply", **world, visibility, summary.reference_spacing_m, executor);
+
     if (!counts) return fail(counts.error());
     summary.reference_samples = counts->samples;
     summary.reference_visible = counts->visible;

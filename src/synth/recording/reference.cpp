@@ -175,9 +175,9 @@ void Visibility::add(const SynthSource& source, const core::Executor& executor, 
   const std::size_t step = std::max<std::size_t>(3, source.size() / 200);
   const std::size_t looks = (source.size() + step - 1) / step;
   executor.parallel_for(looks, [&](std::size_t k) {
-    const dataset::PairInfo info = source.info(k * step);
+    const dataset::PairInfo info = source.true_info(k * step);
     if (!stop.stop_requested() && !source.blind(k * step)) {
-      mark(source.world_from_camera(info.depth_stamp), source.camera().color);
+      mark(source.world_from_camera(info.depth_stamp), source.true_camera().color);
     }
   });
 }

@@ -7,10 +7,14 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "plumbline/sensor/rectify.hpp"
+#include "render/color_faults.hpp"
 #include "render/depth_sensor.hpp"
 #include "render/path.hpp"
 #include "render/render.hpp"
+#include "scene/camera_error.hpp"
 #include "scene/random.hpp"
+#include "scene/rig.hpp"
 
 namespace plumbline::synth {
 
@@ -21,16 +25,19 @@ sensor::Camera make_camera(Sensor sensor, int width, int height, double fps) {
   sensor::Camera camera;
   camera.name = fmt::format("synth_{}", to_string(sensor));
   const double s = std::min(width / 640.0, height / 480.0);
-  const bool wide = sensor == Sensor::kRealsense;  // its colour camera is wider in focus: 69 degrees across
+  // Colour cameras 69 degrees across.
+  const bool wide = sensor == Sensor::kRealsense || sensor == Sensor::kStereo || sensor == Sensor::kPhone;
+
   camera.color = {width,
                   height,
                   (wide ? 462.0 : 535.4) * s,
                   (wide ? 462.0 : 539.2) * s,
                   0.5 * width + 0.1 * s,
                   0.5 * height + 7.6 * s};
+
   if (sensor == Sensor::kIdeal) camera.color.fx = camera.color.fy = 525.0 * s;
   if (sensor == Sensor::kIdeal) camera.color.cx = 0.5 * (width - 1);
-  if (sensor != Sensor::kKinect) camera.color.cy = 0.5 * (height - 1);
+  if (sensor != Sensor::kKinect && sensor != Sensor::kStructured) camera.color.cy = 0.5 * (height - 1);
   camera.depth_scale = 5000.0;
   camera.fps = fps;
   camera.readout_s = 0.0;
@@ -49,6 +56,12 @@ constexpr double kFirstStamp = 100.0;  // seconds; stamps of 0 look like missing
 
 /// Rounds to whole microseconds, the resolution of six decimals in a file.
 double whole_us(double t) { return std::round(t * 1e6) / 1e6; }
+
+/// Size of depth images.
+cv::Size depth_size(const SynthOptions& o) {
+  if (o.depth_width > 0) return {o.depth_width, o.depth_height};
+  return o.sensor == Sensor::kPhone ? cv::Size(256, 192) : cv::Size(o.width, o.height);
+}
 
 std::vector<Stamps> make_stamps(const SynthOptions& o, const std::vector<Event>& events, std::size_t frames,
                                 std::uint64_t seed) {
@@ -77,24 +90,44 @@ struct SynthSource::Impl {
   int robot = 0;
   std::string name;
   std::string format = "synth";
-  sensor::Camera camera;
+  sensor::Camera camera;                               ///< the true one
+  sensor::Camera told;                                 ///< of the recording's file
+  sensor::Pinhole images;                              ///< of rectified pictures
+  std::shared_ptr<const sensor::Rectifier> rectifier;  ///< by `told`; null: pictures are rectified
+  Rigid3 body_from_camera;
+  DepthFaults faults;
+  ColorFaults color_faults;
+  LensMarks marks;
   std::uint64_t seed = 0;
-  std::unique_ptr<CameraPath> path;
+  std::shared_ptr<const CameraPath> path;
   std::vector<Stamps> frames;
   NoiseTiles tiles;
   std::vector<float> gains;  ///< automatic exposure, every kGainStep frames
   static constexpr int kGainStep = 10;
 
-  [[nodiscard]] Rigid3 pose(double stamp) const { return path->world_from_camera(stamp - kFirstStamp); }
+  /// Pose of the camera, which looks ahead along the path if it is not one of a rig.
+  [[nodiscard]] Rigid3 at(double t) const {
+    const Rigid3 ahead = path->world_from_camera(t);
+    return world->options.rig.empty() ? ahead
+                                      : ahead * synth::body_from_camera().inverse() * body_from_camera;
+  }
+  [[nodiscard]] Rigid3 pose(double stamp) const { return at(stamp - kFirstStamp); }
   [[nodiscard]] double event(EventKind kind, double stamp) const {
     for (const Event& e : world->events) {
       if (e.kind == kind && e.active(stamp - kFirstStamp)) return e.value;
     }
     return 0.0;
   }
+  [[nodiscard]] const sensor::Pinhole& depth_camera() const {
+    return camera.depth ? *camera.depth : camera.color;
+  }
   [[nodiscard]] core::Result<void> check_way() const;
   void set_exposure();
   [[nodiscard]] float gain(std::int64_t number) const;
+  /// Factor of faults on the gain of a frame's row that is taken at `stamp`.
+  [[nodiscard]] float row_gain(const Stamps& at, double stamp) const {
+    return faulty_gain(color_faults, at.color - kFirstStamp, stamp - kFirstStamp, seed);
+  }
   [[nodiscard]] cv::Mat3b color(const Stamps& at) const;
   [[nodiscard]] cv::Mat3b rolling(const Stamps& at, const Exposure& exposure) const;
   [[nodiscard]] cv::Mat2f flow(const View& view, const Stamps& at, double extra_px) const;
@@ -103,7 +136,9 @@ struct SynthSource::Impl {
 /// Every step from frame to frame must be free, and must not start inside something.
 core::Result<void> SynthSource::Impl::check_way() const {
   const RobotPath& robot_path =
-      world->scene.robots[static_cast<std::size_t>(robot) % world->scene.robots.size()];
+      world->scene
+          .robots[world->options.rig.empty() ? static_cast<std::size_t>(robot) % world->scene.robots.size()
+                                             : 0];
   const auto complain = [&](const Vector3d& p, double t, const Hit& hit, const char* how) {
     const std::size_t k = path->waypoint_at(t), n = robot_path.waypoints.size();
     const Object& thing =
@@ -119,25 +154,25 @@ core::Result<void> SynthSource::Impl::check_way() const {
   };
 
   const double end = frames.back().color - kFirstStamp;
-  const Vector3d first = path->world_from_camera(0.0).translation;
+  const Vector3d first = at(0.0).translation;
   const Vector3d up = Vector3d(0.0123, 0.0211, 1.0).normalized();
   if (const Hit hit = world->cast(first, up, 1e4); hit.face >= 0 && !hit.front) {
     return complain(first, 0.0, hit, "starts inside");
   }
 
-  Vector3d at = first;
+  Vector3d here = first;
   const double once = std::min(end, 2.0 * path->duration() + 60.0);  // later rounds repeat the first
 
   for (double t = 0.02; t <= once; t += 0.02) {
-    const Vector3d to = path->world_from_camera(t).translation;
-    const Vector3d step = to - at;
+    const Vector3d to = at(t).translation;
+    const Vector3d step = to - here;
     const double length = step.norm();
     if (length > 1e-7) {
       // 5 cm of room in front of the camera body
-      const Hit hit = world->cast(at, step / length, length + 0.05);
+      const Hit hit = world->cast(here, step / length, length + 0.05);
       if (hit.face >= 0) return complain(to, t, hit, "goes through");
     }
-    at = to;
+    here = to;
   }
 
   return {};
@@ -149,8 +184,7 @@ void SynthSource::Impl::set_exposure() {
   float level = 0.0F;
   for (std::size_t i = 0; i < last; ++i) {
     const double t = static_cast<double>(i * kGainStep) / world->options.fps;
-    const float now =
-        std::max(0.02F, mean_level(*world, look(*world, small.color, path->world_from_camera(t))));
+    const float now = std::max(0.02F, mean_level(*world, look(*world, small.color, this->at(t))));
     level = i == 0 ? now : level + 0.25F * (now - level);
     gains.push_back(std::clamp(0.68F / level, 0.35F, 3.0F));
   }
@@ -164,9 +198,9 @@ float SynthSource::Impl::gain(std::int64_t number) const {
 
 /// Pixels that things move during the exposure, on a grid 8 times coarser than the picture.
 cv::Mat2f SynthSource::Impl::flow(const View& view, const Stamps& at, double extra_px) const {
-  constexpr double kExposure = 0.010;
-  const Rigid3 later = pose(at.color + 0.5 * kExposure).inverse(),
-               sooner = pose(at.color - 0.5 * kExposure).inverse();
+  const double exposure = color_faults.motion_blur > 0.0 ? color_faults.motion_blur : 0.010;
+  const Rigid3 later = pose(at.color + 0.5 * exposure).inverse(),
+               sooner = pose(at.color - 0.5 * exposure).inverse();
   const int w = (view.ids.cols + 7) / 8, h = (view.ids.rows + 7) / 8;
   cv::Mat2f out(h, w);
 
@@ -195,6 +229,7 @@ cv::Mat2f SynthSource::Impl::flow(const View& view, const Stamps& at, double ext
 cv::Mat3b SynthSource::Impl::rolling(const Stamps& at, const Exposure& exposure) const {
   constexpr int kRows = 8;
   cv::Mat3b image(camera.color.height, camera.color.width);
+
   for (int first = 0; first < image.rows; first += kRows) {
     sensor::Pinhole strip = camera.color;
     strip.height = std::min(kRows, image.rows - first);
@@ -204,7 +239,13 @@ cv::Mat3b SynthSource::Impl::rolling(const Stamps& at, const Exposure& exposure)
     View view = look(*world, strip, pose(stamp), stamp - kFirstStamp);
     view.first_row = first;
     view.picture_rows = image.rows;
-    shade(*world, view, exposure).copyTo(image.rowRange(first, first + strip.height));
+
+    cv::Mat3b rows = shade(*world, view, {exposure.gain * row_gain(at, stamp), exposure.vignette});
+    for (int y = 0; color_faults.flicker > 0.0 && y < rows.rows; ++y) {
+      const double row_stamp = stamp + (y + 0.5 - 0.5 * rows.rows) / image.rows * world->options.readout_s;
+      rows.row(y) *= row_gain(at, row_stamp) / row_gain(at, stamp);
+    }
+    rows.copyTo(image.rowRange(first, first + strip.height));
   }
   return image;
 }
@@ -218,15 +259,20 @@ cv::Mat3b SynthSource::Impl::color(const Stamps& at) const {
   if (event(EventKind::kCover, at.color) != 0.0) exposure.gain *= 0.004F;
   if (event(EventKind::kWhiteout, at.color) != 0.0) exposure.gain *= 60.0F;
 
-  cv::Mat3b image = world->options.readout_s > 0.0 ? rolling(at, exposure) : shade(*world, view, exposure);
+  cv::Mat3b image = world->options.readout_s > 0.0
+                        ? rolling(at, exposure)
+                        : shade(*world, view, {exposure.gain * row_gain(at, at.color), exposure.vignette});
   const double blur = event(EventKind::kBlur, at.color);
+  const bool moves = color_faults.motion_blur > 0.0;
+
   if (real) {
     cv::GaussianBlur(image, image, {3, 3}, 0.6);  // lens and mosaic
     image = motion_blur(image, flow(view, at, blur));
-  } else if (blur > 0.0) {
+  } else if (blur > 0.0 || moves) {
     image = motion_blur(image, flow(view, at, blur));
   }
 
+  marks.apply(image);
   const float noise_gain = event(EventKind::kLampOff, at.color) != 0.0 ? 3.0F : exposure.gain;
   add_color_noise(image, sensor, noise_gain, tiles, {seed, at.number});
   return image;
@@ -240,32 +286,50 @@ core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_p
                                                                    int robot) {
   const SynthOptions& o = world->options;
   if (auto ok = check(o); !ok) return tl::unexpected<core::Error>(ok.error());
-  if (robot < 0 || robot >= o.robots) {
+  if (robot < 0 || robot >= recordings(o)) {
     return core::usage_error(
-        fmt::format("robot {} of {}: robots count from 0 to {}", robot, o.robots, o.robots - 1));
+        fmt::format("robot {} of {}: robots count from 0 to {}", robot, recordings(o), recordings(o) - 1));
   }
 
   const auto paths = world->scene.robots.size();
-  const RobotPath& way = world->scene.robots[static_cast<std::size_t>(robot) % paths];
+  const int driver = o.rig.empty() ? robot : 0;
+  const RobotPath& way = world->scene.robots[static_cast<std::size_t>(driver) % paths];
   auto impl = std::make_unique<Impl>();
   impl->world = world;
   impl->robot = robot;
-  impl->name = o.robots > 1 ? fmt::format("{}-robot{}", world->scene.name, robot) : world->scene.name;
+  impl->name = recordings(o) > 1 ? fmt::format("{}-robot{}", world->scene.name, robot) : world->scene.name;
+
   impl->camera = make_camera(o.sensor, o.width, o.height, o.fps);
   impl->camera.readout_s = o.readout_s;
   impl->camera.depth_delay_s = o.depth_delay_s;
+  if (const cv::Size depth = depth_size(o); depth != cv::Size(o.width, o.height)) {
+    impl->camera.depth = impl->camera.color.resized(depth.width, depth.height);
+    impl->camera.color_from_depth = Rigid3();
+  }
+
+  auto told = told_camera(o, robot, impl->camera);
+  if (!told) return tl::unexpected<core::Error>(told.error());
+  impl->told = std::move(*told);
+  impl->images = impl->told.color;
+  impl->body_from_camera =
+      o.rig.empty() ? synth::body_from_camera() : (*read_rig(o))[static_cast<std::size_t>(robot)];
+
+  impl->faults = *depth_faults(o.depth_faults);
+  impl->color_faults = *color_faults(o.color_faults);
+  if (!o.camera_error.empty() || impl->camera.depth)
+    impl->rectifier = std::make_shared<const sensor::Rectifier>(impl->told);
   impl->seed = mix(static_cast<std::uint64_t>(o.seed), static_cast<std::uint64_t>(robot) + 1);
 
   CameraPath::Options motion;
   motion.speed = o.speed;
   motion.wheeled = (o.motion == Motion::kScene ? world->scene.motion : o.motion) == Motion::kWheeled;
-  motion.seed = impl->seed;
+  motion.seed = mix(static_cast<std::uint64_t>(o.seed), static_cast<std::uint64_t>(driver) + 1);
 
   // More robots than paths: the next ones start further along.
-  const auto lap = static_cast<std::size_t>(robot) / paths;
+  const auto lap = static_cast<std::size_t>(driver) / paths;
   motion.start_share = 0.381966 * static_cast<double>(lap);
   motion.events = world->events;
-  impl->path = std::make_unique<CameraPath>(way, motion);
+  impl->path = std::make_shared<const CameraPath>(way, motion);
 
   const std::size_t frames = o.frames > 0 ? static_cast<std::size_t>(o.frames)
                                           : static_cast<std::size_t>(impl->path->duration() * o.fps) + 1;
@@ -282,6 +346,8 @@ core::Result<std::unique_ptr<SynthSource>> SynthSource::create(std::shared_ptr<c
   auto planned = plan(std::move(world), robot);
   if (!planned) return tl::unexpected<core::Error>(planned.error());
   std::unique_ptr<Impl> impl = std::move(*planned);
+  impl->marks =
+      LensMarks(impl->color_faults, {impl->camera.color.width, impl->camera.color.height}, impl->seed);
   impl->tiles = make_noise(impl->world->options.sensor, impl->seed);
   impl->set_exposure();
   return std::unique_ptr<SynthSource>(new SynthSource(std::move(impl)));
@@ -293,7 +359,7 @@ core::Result<void> check_paths(const Scene& scene, const SynthOptions& options) 
     return core::usage_error(
         fmt::format("scene '{}' has no surfaces or no robot; add `objects:` and `robots:`", scene.name));
   const auto world = std::make_shared<const World>(scene, options);
-  for (int robot = 0; robot < options.robots; ++robot) {
+  for (int robot = 0; robot < recordings(options); ++robot) {
     if (auto planned = SynthSource::plan(world, robot); !planned)
       return tl::unexpected<core::Error>(planned.error());
   }
@@ -302,39 +368,66 @@ core::Result<void> check_paths(const Scene& scene, const SynthOptions& options) 
 
 const std::string& SynthSource::name() const { return impl_->name; }
 const std::string& SynthSource::format() const { return impl_->format; }
-const sensor::Camera& SynthSource::camera() const { return impl_->camera; }
+const sensor::Camera& SynthSource::camera() const { return impl_->told; }
+const sensor::Camera& SynthSource::true_camera() const { return impl_->camera; }
 std::size_t SynthSource::size() const { return impl_->frames.size(); }
 
-dataset::PairInfo SynthSource::info(std::size_t index) const {
+dataset::PairInfo SynthSource::true_info(std::size_t index) const {
   const Stamps& at = impl_->frames.at(index);
   return {at.color, at.depth, "", ""};
 }
 
-core::Result<sensor::RgbdFrame> SynthSource::read(std::size_t index) const {
+dataset::PairInfo SynthSource::info(std::size_t index) const {
+  dataset::PairInfo info = true_info(index);
+  info.depth_stamp += impl_->told.depth_delay_s - impl_->camera.depth_delay_s;
+  return info;
+}
+
+std::unique_ptr<dataset::FrameSource> SynthSource::taken_by(const sensor::Camera& better) const {
+  const SynthOptions& o = impl_->world->options;
+  if (o.camera_error.empty() && o.depth_faults.empty()) return nullptr;
+  auto impl = std::make_unique<Impl>(*impl_);
+  impl->rectifier = std::make_shared<const sensor::Rectifier>(better, impl_->images);
+  impl->told = better;
+  return std::unique_ptr<FrameSource>(new SynthSource(std::move(impl)));
+}
+
+core::Result<dataset::StoredPair> SynthSource::stored(std::size_t index) const {
   if (index >= impl_->frames.size()) {
     return core::input_error(fmt::format("{}: frame {} of {}", impl_->name, index, impl_->frames.size()));
   }
 
   const Stamps& at = impl_->frames[index];
+  dataset::StoredPair pair;
+  pair.color.pixels = impl_->color(at);
+  if (blind(index)) {
+    pair.depth.pixels = cv::Mat1w::zeros(depth_size(impl_->world->options));
+  } else {
+    const View view =
+        look(*impl_->world, impl_->depth_camera(), impl_->pose(at.depth), at.depth - kFirstStamp);
+    pair.depth.pixels = measure_depth(*impl_->world, view, impl_->world->options.sensor, impl_->faults,
+                                      impl_->tiles, {impl_->seed, at.number});
+  }
+  return pair;
+}
+
+core::Result<sensor::RgbdFrame> SynthSource::read(std::size_t index) const {
+  const auto pair = stored(index);
+  if (!pair) return tl::unexpected<core::Error>(pair.error());
+  const sensor::Rectifier* rectifier = impl_->rectifier.get();
+  const dataset::PairInfo at = info(index);
   sensor::RgbdFrame frame;
   frame.index = static_cast<std::int64_t>(index);
-  frame.stamp = at.color;
-  frame.depth_stamp = at.depth;
+  frame.stamp = at.stamp;
+  frame.depth_stamp = at.depth_stamp;
 
-  const cv::Mat3b color = impl_->color(at);
-  frame.color = color;
+  frame.color = rectifier ? rectifier->color(pair->color.pixels) : pair->color.pixels;
   cv::cvtColor(frame.color, frame.gray, cv::COLOR_BGR2GRAY);
-
-  cv::Mat1w raw;
-  if (blind(index)) {
-    raw = cv::Mat1w::zeros(color.size());
+  if (rectifier) {
+    frame.depth = rectifier->depth(pair->depth.pixels);
   } else {
-    const View view = look(*impl_->world, impl_->camera.color, impl_->pose(at.depth), at.depth - kFirstStamp);
-    raw = measure_depth(*impl_->world, view, impl_->world->options.sensor, impl_->tiles,
-                        {impl_->seed, at.number});
+    pair->depth.pixels.convertTo(frame.depth, CV_32F, 1.0 / impl_->camera.depth_scale);
   }
-
-  raw.convertTo(frame.depth, CV_32F, 1.0 / impl_->camera.depth_scale);
   return frame;
 }
 
@@ -350,11 +443,32 @@ Rigid3 SynthSource::world_from_camera(double stamp) const {
                                 std::max(f.back().color, f.back().depth)));
 }
 
+PathMotion SynthSource::motion(double stamp, const Rigid3& camera_from_frame) const {
+  constexpr double kStep = 1e-3;
+  const auto at = [&](double t) { return impl_->pose(t) * camera_from_frame; };
+  const Rigid3 before = at(stamp - kStep), now = at(stamp), after = at(stamp + kStep);
+  return {now, (after.translation - before.translation) / (2.0 * kStep),
+          (after.translation - 2.0 * now.translation + before.translation) / (kStep * kStep),
+          geometry::log_so3(before.rotation.transpose() * after.rotation) / (2.0 * kStep)};
+}
+
+const Rigid3& SynthSource::body_from_camera() const { return impl_->body_from_camera; }
+double SynthSource::start() const { return kFirstStamp; }
+const std::vector<Event>& SynthSource::events() const { return impl_->world->events; }
+
+cv::Mat1b SynthSource::moving(std::size_t index) const {
+  const World& world = *impl_->world;
+  if (world.movers.empty()) return {};
+  const double stamp = impl_->frames.at(index).color;
+  const View view = look(world, impl_->camera.color, impl_->pose(stamp), stamp - kFirstStamp);
+  return cv::Mat1b(view.ids >= static_cast<int>(world.fixed_faces));
+}
+
 ExactFrame SynthSource::exact(std::size_t index) const {
   const Stamps& at = impl_->frames.at(index);
   ExactFrame out;
   out.world_from_depth = impl_->pose(at.depth);
-  const View view = look(*impl_->world, impl_->camera.color, out.world_from_depth, at.depth - kFirstStamp);
+  const View view = look(*impl_->world, impl_->depth_camera(), out.world_from_depth, at.depth - kFirstStamp);
   out.depth = exact_depth(view);
   out.face = view.ids;
   return out;

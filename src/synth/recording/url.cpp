@@ -55,7 +55,8 @@ core::Result<Parsed> parse_url(const std::string& url) {
   core::ConfigProblems problems;
   table.set_all(map, "", problems);
   if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));
-  if (parsed.robot >= parsed.options.robots) parsed.options.robots = parsed.robot + 1;
+  if (parsed.options.rig.empty() && parsed.robot >= parsed.options.robots)
+    parsed.options.robots = parsed.robot + 1;
   return parsed;
 }
 

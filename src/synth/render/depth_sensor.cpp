@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "plumbline/sensor/depth_noise.hpp"
+#include "render/sensor_model.hpp"
 #include "scene/random.hpp"
 
 namespace plumbline::synth {
@@ -26,6 +27,9 @@ struct Device {
   float left, right, top, bottom;
 };
 Device device(Sensor sensor) {
+  if (sensor == Sensor::kTof) return {0.0F, 0.0F, 0.5F, 0.35F, 0.3F, 0.0F, 0.0F, 0.0F, 0.0F};
+  if (sensor == Sensor::kStereo) return {23.1F, 1.0F / 32.0F, 2.0F, 0.3F, 0.3F, 0.04F, 0.0F, 0.0F, 0.0F};
+  if (sensor == Sensor::kPhone) return {0.0F, 0.0F, 1.0F, 0.9F, 0.3F, 0.0F, 0.0F, 0.0F, 0.0F};
   if (sensor == Sensor::kRealsense) return {31.0F, 1.0F / 32.0F, 1.6F, 0.35F, 0.5F, 0.03F, 0.0F, 0.0F, 0.0F};
   return {43.5F, 1.0F / 8.0F, 1.2F, 0.06F, 0.5F, 0.010F, 0.046F, 0.026F, 0.023F};
 }
@@ -140,10 +144,12 @@ Seen seen_columns(const Device& d, int width, int height, int y) {
 
 class Measurement {
  public:
-  Measurement(const World& world, const View& view, Sensor sensor, const NoiseTiles& tiles,
-              const FrameKey& key)
+  Measurement(const World& world, const View& view, Sensor sensor, const DepthFaults& faults,
+              const NoiseTiles& tiles, const FrameKey& key)
       : world_(world),
         view_(view),
+        seen_(faulty_depth(world, view, faults, frame_bits(key, 41, key.index))),
+        sensor_(sensor),
         device_(device(sensor)),
         range_(depth_range(sensor)),
         tiles_(tiles),
@@ -151,27 +157,71 @@ class Measurement {
 
   cv::Mat1w run() {
     cv::Mat1b border;
-    cv::Mat1f depth = wander(exact_depth(view_), device_, tiles_, key_, border);
+    cv::Mat1f depth = wander(seen_.depth, device_, tiles_, key_, border);
     cast_shadow(depth, device_.focal_baseline);
     cv::Mat1w raw(depth.size());
-    for (int y = 0; y < raw.rows; ++y) row(y, depth, border, raw[y]);
+    for (int y = 0; y < raw.rows; ++y) {
+      if (modelled(sensor_)) {
+        model_row(y, depth, border, raw[y]);
+      } else {
+        row(y, depth, border, raw[y]);
+      }
+    }
     return raw;
   }
 
  private:
   [[nodiscard]] float signal(int face, int x, int y, float z) const {
-    const auto id = static_cast<std::size_t>(face);
-    const Material& m = *world_.materials[id];
-    const FaceView& f = view_.faces[id];
-    const auto px = static_cast<float>(x), py = static_cast<float>(y);
-    // 1/z = c.p with c = M^T n / h, so the cosine of incidence follows from n = M^-T c h.
-    const auto fx = static_cast<float>(view_.camera.fx), fy = static_cast<float>(view_.camera.fy);
-    const auto cx = static_cast<float>(view_.camera.cx), cy = static_cast<float>(view_.camera.cy);
-    const float nx = f.c[0] * fx, ny = f.c[1] * fy, nz = f.c[2] + f.c[0] * cx + f.c[1] * cy;
-    const float dx = (px - cx) / fx, dy = (py - cy) / fy;
-    const float cosine = std::abs(nx * dx + ny * dy + nz) /
-                         std::sqrt((nx * nx + ny * ny + nz * nz) * (dx * dx + dy * dy + 1.0F));
-    return light_back(m, cosine, z);
+    return light_back(*world_.materials[static_cast<std::size_t>(face)], incidence(view_, face, x, y), z);
+  }
+
+  [[nodiscard]] bool mirrors(int x, int y) const { return !seen_.mirror.empty() && seen_.mirror(y, x) != 0; }
+
+  /// Depth at a border: 0 if the window saw two surfaces; some pixels float between them.
+  [[nodiscard]] float border_depth(const cv::Mat1f& depth, int x, int y, float chance) const {
+    const float z = depth(y, x);
+    if (chance > 0.9F) return 0.0F;
+    if (!(chance < -1.0F && std::abs(chance + 1.0F) < 2.5F * device_.flying)) return z;
+    const float other = depth(y, std::max(0, x - 2));
+    return other > 0.0F ? 0.5F * (z + other) : z;
+  }
+
+  /// A row of a sensor whose noise and limits are formulas.
+  void model_row(int y, const cv::Mat1f& depth, const cv::Mat1b& border, std::uint16_t* out) const {
+    const Field still(tiles_.fine, mix(key_.seed, 21)), now(tiles_.fine, frame_bits(key_, 22, key_.index));
+    const Field flicker(tiles_.medium, frame_bits(key_, 24, key_.index));
+    const auto share = static_cast<double>(device_.fixed_share);
+    const double fixed = std::sqrt(share), fresh = std::sqrt(1.0 - share);
+    std::fill(out, out + depth.cols, std::uint16_t{0});
+
+    const auto [first, end] = seen_columns(device_, depth.cols, depth.rows, y);
+    for (int x = first; x < end; ++x) {
+      const int face = view_.ids(y, x);
+      if (!(depth(y, x) > 0.0F) || face < 0) continue;
+      const float chance = flicker.at(x, y);
+      const auto z = static_cast<double>(border(y, x) != 0 ? border_depth(depth, x, y, chance) : depth(y, x));
+      if (z < range_.min || z > range_.max) continue;
+
+      const auto cosine = std::min(1.0, static_cast<double>(incidence(view_, face, x, y)));
+      const auto reflectance =
+          static_cast<double>(world_.materials[static_cast<std::size_t>(face)]->infrared);
+      const double least = 1.0 + kSignalFlicker * static_cast<double>(chance);
+      if (!mirrors(x, y) && model_signal(sensor_, reflectance, cosine, z) < least) continue;
+
+      const double sigma = model_sigma(sensor_, z, std::acos(cosine), view_.camera.fx);
+      const double noise =
+          fixed * static_cast<double>(still.at(x, y)) + fresh * static_cast<double>(now.at(x, y));
+      const double raw = 5000.0 * stepped(z, sigma, noise);
+      if (raw > 0.0 && raw < 65534.5) out[x] = static_cast<std::uint16_t>(raw + 0.5);
+    }
+  }
+  /// Depth with noise; if the sensor measures disparity, in steps of it, which are a part of the noise.
+  [[nodiscard]] double stepped(double z, double sigma, double noise) const {
+    if (!(device_.step > 0.0F)) return z + sigma * noise;
+    const auto focal_baseline = static_cast<double>(device_.focal_baseline);
+    const double step = static_cast<double>(device_.step), spread = sigma * focal_baseline / (z * z);
+    const double own = std::sqrt(std::max(0.15 * spread * spread, spread * spread - step * step / 12.0));
+    return focal_baseline / (step * std::round((focal_baseline / z + own * noise) / step));
   }
 
   void row(int y, const cv::Mat1f& depth, const cv::Mat1b& border, std::uint16_t* out) const {
@@ -191,17 +241,12 @@ class Measurement {
       if (!(z > 0.0F) || ids[x] < 0) continue;
 
       const float chance = flicker.at(x, y);
-      if (border(y, x) != 0) {
-        if (chance > 0.9F) continue;  // the window saw two surfaces
-        if (chance < -1.0F && std::abs(chance + 1.0F) < 2.5F * device_.flying) {
-          const float other = depth(y, std::max(0, x - 2));
-          if (other > 0.0F) z = 0.5F * (z + other);
-        }
-      }
+      if (border(y, x) != 0) z = border_depth(depth, x, y, chance);
+      if (!(z > 0.0F)) continue;
 
       if (ids[x] != lit || (x & 3) == 0) weak = signal(ids[x], x, y, z);
       lit = ids[x];
-      if (weak < kLeastLight + 0.018F * blobs.at(x, y) + 0.012F * chance) continue;
+      if (!mirrors(x, y) && weak < kLeastLight + 0.018F * blobs.at(x, y) + 0.012F * chance) continue;
 
       const auto zd = static_cast<double>(z);
       if (zd < range_.min || zd > range_.max + 0.15 * static_cast<double>(blobs.at(x, y))) continue;
@@ -222,6 +267,8 @@ class Measurement {
 
   const World& world_;
   const View& view_;
+  FaultyDepth seen_;
+  Sensor sensor_;
   Device device_;
   DepthRange range_;
   const NoiseTiles& tiles_;
@@ -233,6 +280,10 @@ class Measurement {
 DepthRange depth_range(Sensor sensor) {
   if (sensor == Sensor::kKinect) return {0.45, 7.0};
   if (sensor == Sensor::kRealsense) return {0.25, 9.0};
+  if (sensor == Sensor::kTof) return {0.5, 5.46};
+  if (sensor == Sensor::kStructured) return {0.5, 5.0};
+  if (sensor == Sensor::kStereo) return {0.2, 10.0};
+  if (sensor == Sensor::kPhone) return {0.2, 5.0};
   return {0.05, 13.1};
 }
 
@@ -242,6 +293,9 @@ bool measures(Sensor sensor, const Material& material, const cv::Size& size, con
   constexpr float kFlicker = 0.05F;  // about two standard deviations of the least light
   const Seen seen = seen_columns(device(sensor), size.width, size.height, static_cast<int>(pixel.y));
   if (pixel.x < seen.first || pixel.x >= seen.end) return false;
+  if (modelled(sensor))
+    return model_signal(sensor, static_cast<double>(material.infrared), cosine, z) >
+           1.0 + 2.0 * kSignalFlicker;
   return light_back(material, static_cast<float>(cosine), static_cast<float>(z)) > kLeastLight + kFlicker;
 }
 
@@ -250,7 +304,7 @@ NoiseTiles make_noise(Sensor sensor, std::uint64_t seed) {
   if (sensor == Sensor::kIdeal) return tiles;
 
   tiles.fine = white_tile(mix(seed, 1));
-  correlate(tiles.fine, sensor == Sensor::kRealsense ? 1.8 : 1.1);
+  correlate(tiles.fine, sensor == Sensor::kRealsense || sensor == Sensor::kStereo ? 1.8 : 1.1);
   tiles.medium = white_tile(mix(seed, 7));
   correlate(tiles.medium, 3.0);
   tiles.coarse = white_tile(mix(seed, 2));
@@ -279,10 +333,10 @@ NoiseTiles make_noise(Sensor sensor, std::uint64_t seed) {
   return tiles;
 }
 
-cv::Mat1w measure_depth(const World& world, const View& view, Sensor sensor, const NoiseTiles& tiles,
-                        const FrameKey& key) {
-  if (sensor != Sensor::kIdeal) return Measurement(world, view, sensor, tiles, key).run();
-  const cv::Mat1f exact = exact_depth(view);
+cv::Mat1w measure_depth(const World& world, const View& view, Sensor sensor, const DepthFaults& faults,
+                        const NoiseTiles& tiles, const FrameKey& key) {
+  if (sensor != Sensor::kIdeal) return Measurement(world, view, sensor, faults, tiles, key).run();
+  const cv::Mat1f exact = faulty_depth(world, view, faults, frame_bits(key, 41, key.index)).depth;
   cv::Mat1w raw(exact.size());
   const auto range = depth_range(sensor);
   const auto min = static_cast<float>(range.min), max = static_cast<float>(range.max);

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <opencv2/core.hpp>
 
+#include "render/depth_faults.hpp"
 #include "render/render.hpp"
 
 namespace plumbline::synth {
@@ -26,8 +27,8 @@ struct FrameKey {
 };
 
 /// CV_16UC1 raw depth, 5000 per metre, 0 = no measurement. `view` was taken at the depth stamp.
-cv::Mat1w measure_depth(const World& world, const View& view, Sensor sensor, const NoiseTiles& tiles,
-                        const FrameKey& key);
+cv::Mat1w measure_depth(const World& world, const View& view, Sensor sensor, const DepthFaults& faults,
+                        const NoiseTiles& tiles, const FrameKey& key);
 
 /// Adds colour noise in place; does nothing for Sensor::kIdeal.
 void add_color_noise(cv::Mat3b& image, Sensor sensor, float gain, const NoiseTiles& tiles,

@@ -7,6 +7,9 @@
 
 #include "plumbline/core/config.hpp"
 #include "plumbline/core/numbers.hpp"
+#include "scene/camera_error.hpp"
+#include "scene/faults.hpp"
+#include "scene/rig.hpp"
 
 namespace plumbline::synth {
 
@@ -34,8 +37,15 @@ void SynthOptions::declare(core::OptionTable& table) {
                "Strength of textures; none: white cloth and grey floors");
 
   table.choice("sensor", sensor,
-               {{"ideal", Sensor::kIdeal}, {"kinect", Sensor::kKinect}, {"realsense", Sensor::kRealsense}},
+               {{"ideal", Sensor::kIdeal},
+                {"kinect", Sensor::kKinect},
+                {"realsense", Sensor::kRealsense},
+                {"tof", Sensor::kTof},
+                {"structured", Sensor::kStructured},
+                {"stereo", Sensor::kStereo},
+                {"phone", Sensor::kPhone}},
                "Camera model; ideal: no noise, no offset between stamps, no blur");
+
   table.choice("motion", motion,
                {{"scene", Motion::kScene}, {"handheld", Motion::kHandheld}, {"wheeled", Motion::kWheeled}},
                "Motion of the camera; scene: as the scene file says");
@@ -57,6 +67,36 @@ void SynthOptions::declare(core::OptionTable& table) {
   table.text("events", events,
              "Difficult moments, kind@start+duration[*value] in seconds, separated by commas; kinds: "
              "whiteout, lampoff, blur (value px), drop, cover, spin (value turns), nodepth");
+
+  table.text("camera_error", camera_error,
+             "Errors of the recording's camera file: a seed that draws some, or differences from the truth, "
+             "such as fx=1.5%,cx=3,k1=0.03,slope=0.02,readout=10ms,delay=15ms (also fy, cy, k2, p1, p2, k3, "
+             "slope_y)");
+  table.text(
+      "depth_faults", depth_faults,
+      "Faults of depth, key or key=value, separated by commas: offset (1/m), scale, radial, drift, ray, "
+      "holes, multipath (m), flying, stripes, mirrors; a key alone has its usual strength");
+
+  table.text(
+      "color_faults", color_faults,
+      "Faults of colour, key or key=value, separated by commas: hunting, jumps, flicker (Hz), motion_blur "
+      "(s), dots, specks; a key alone has its usual strength");
+  table.integer("depth_width", depth_width, {0, 4096}, "px",
+                "Width of depth images, registered to colour; 0: as colour, of a phone 256");
+
+  table.integer("depth_height", depth_height, {0, 4096}, "px", "Height of depth images");
+  table.text(
+      "imu", imu,
+      "Write imu.csv: ideal or usual, then settings, such as usual,gyro_bias=0.01,delay=5ms (rate, "
+      "gyro_noise, gyro_bias, gyro_walk, accel_noise, accel_bias, accel_walk, scale, misalign, delay, gaps)");
+
+  table.text("odometry", odometry,
+             "Write odometry.csv of wheels: ideal or usual, then settings (rate, scale, turn, noise, slip)");
+  table.text("rig", rig, "YAML file with the cameras of one body: each makes a recording of the same path");
+  table.choice("out_format", mcap, {{"folder", false}, {"mcap", true}},
+               "Write a folder of pictures or an MCAP file for each recording");
+  table.boolean("moving_masks", moving_masks,
+                "Write moving/: a mask for each colour picture, white where something moves");
 }
 
 namespace {
@@ -144,14 +184,35 @@ core::Result<void> check(const SynthOptions& options) {
   if (!(options.fps > 0.0) || !(options.speed > 0.0))
     return core::usage_error("fps, speed: must be positive");
   if (auto events = parse_events(options.events); !events) return tl::unexpected<core::Error>(events.error());
+  if (auto faults = depth_faults(options.depth_faults); !faults)
+    return tl::unexpected<core::Error>(faults.error());
+
+  if (auto faults = color_faults(options.color_faults); !faults)
+    return tl::unexpected<core::Error>(faults.error());
+  if (auto imu = imu_model(options.imu); !imu) return tl::unexpected<core::Error>(imu.error());
+  if (auto wheels = odometry_model(options.odometry); !wheels)
+    return tl::unexpected<core::Error>(wheels.error());
+  if (auto rig = read_rig(options); !rig) return tl::unexpected<core::Error>(rig.error());
+
+  if ((options.depth_width > 0) != (options.depth_height > 0))
+    return core::usage_error("depth_width, depth_height: give both or none");
+  if (auto error = camera_error(options.camera_error, 0, options.width); !error)
+    return tl::unexpected<core::Error>(error.error());
   return {};
 }
 
+const char* to_string(EventKind kind) {
+  for (const KindName& k : kKinds) {
+    if (k.kind == kind) return k.name;
+  }
+  return "";
+}
 const char* to_string(Texture texture) {
   return texture == Texture::kFull ? "full" : texture == Texture::kWeak ? "weak" : "none";
 }
 const char* to_string(Sensor sensor) {
-  return sensor == Sensor::kIdeal ? "ideal" : sensor == Sensor::kKinect ? "kinect" : "realsense";
+  constexpr const char* kNames[] = {"ideal", "kinect", "realsense", "tof", "structured", "stereo", "phone"};
+  return kNames[static_cast<int>(sensor)];
 }
 const char* to_string(Route route) {
   switch (route) {

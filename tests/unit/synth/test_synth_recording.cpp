@@ -95,7 +95,7 @@ TEST_F(SynthRecording, SameBytesOnAnyNumberOfThreads) {
     EXPECT_EQ(bytes(entry.path()), bytes(folder_ / "two" / fs::relative(entry.path(), folder_ / "one")))
         << entry.path();
   }
-  EXPECT_EQ(files, 2U * (12U + 5U) + 2U);
+  EXPECT_EQ(files, 2U * (12U + 6U) + 2U);
 }
 
 TEST_F(SynthRecording, ReferenceLiesOnTheSurfacesAndTellsWhatWasSeen) {

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Measurements of a body beside those of its camera.
+#include <Eigen/Core>
+#include <vector>
+
+#include "plumbline/geometry/rigid3.hpp"
+
+namespace plumbline::dataset {
+
+/// In the frame of the body: x forward, y to the left, z up.
+struct ImuReading {
+  double stamp = 0.0;
+  Eigen::Vector3d turn_rate;     ///< rad/s
+  Eigen::Vector3d acceleration;  ///< m/s^2, with gravity: (0, 0, 9.81) at rest
+};
+
+struct OdometryReading {
+  double stamp = 0.0;
+  geometry::Rigid3 odom_from_body;  ///< in a plane, from the first reading's place on
+  Eigen::Vector3d velocity;         ///< m/s, body
+  double turn_rate = 0.0;           ///< rad/s, about z
+};
+
+struct BodyReadings {
+  std::vector<ImuReading> imu;  ///< by stamp
+  std::vector<OdometryReading> odometry;
+  geometry::Rigid3 body_from_camera;
+};
+
+}  // namespace plumbline::dataset

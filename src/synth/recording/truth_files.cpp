@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recording/truth_files.hpp"
+
+#include <fmt/format.h>
+
+namespace plumbline::synth {
+
+std::string describe_truth(const SynthSource& source, const std::vector<double>& moving) {
+  std::string text = "stamp,x,y,z,qx,qy,qz,qw,vx,vy,vz,wx,wy,wz,moving,covered,events\n";
+  for (std::size_t i = 0; i < moving.size(); ++i) {
+    const double stamp = source.info(i).stamp;
+    const geometry::Rigid3 pose = source.world_from_camera(stamp);
+    const Eigen::Quaterniond q = pose.quaternion();
+    const PathMotion motion = source.motion(stamp);
+    bool covered = false;
+    std::string active;
+
+    for (const Event& event : source.events()) {
+      if (!event.active(stamp - source.start())) continue;
+      covered = covered || event.kind == EventKind::kCover;
+      active += (active.empty() ? "" : " ") + std::string(to_string(event.kind));
+    }
+
+    text += fmt::format("{:.6f}", stamp);
+    for (const double v : {pose.translation.x(), pose.translation.y(), pose.translation.z()})
+      text += fmt::format(",{:.6f}", v);
+    for (const double v : {q.x(), q.y(), q.z(), q.w()}) text += fmt::format(",{:.9f}", v);
+    for (const double v : motion.velocity) text += fmt::format(",{:.6f}", v);
+    for (const double v : motion.turn_rate) text += fmt::format(",{:.6f}", v);
+    text += fmt::format(",{:.6f},{},{}\n", moving[i], covered ? 1 : 0, active);
+  }
+  return text;
+}
+
+std::string describe_events(const SynthSource& source) {
+  std::string text = "kind,from_stamp,to_stamp,value\n";
+  for (const Event& e : source.events()) {
+    text += fmt::format("{},{:.6f},{:.6f},{}\n", to_string(e.kind), source.start() + e.start_s,
+                        source.start() + e.start_s + e.duration_s, e.value);
+  }
+  return text;
+}
+
+}  // namespace plumbline::synth
