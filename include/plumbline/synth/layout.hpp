@@ -17,4 +17,8 @@ core::Result<Scene> make_layout(const std::string& kind, const SynthOptions& opt
 core::Result<Scene> open_scene(const std::string& name_or_file, const SynthOptions& options,
                                const std::filesystem::path& scenes_folder);
 
+/// Adds people who walk about near the path of the scene's first robot until the scene has `count` walkers.
+/// False if the floor has no room for them.
+bool add_people(int count, int seed, Scene& scene);
+
 }  // namespace plumbline::synth

@@ -80,6 +80,7 @@ struct Plan {
   std::vector<PlanRoom> rooms;
   std::vector<PlanOpening> openings;
   std::vector<PlanThing> things;
+  std::vector<double> storeys = {0.0};  ///< heights of their floors, m
 
   /// The middle of an opening, within its wall.
   [[nodiscard]] Eigen::Vector2d middle(const PlanOpening& o) const {

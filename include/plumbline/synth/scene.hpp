@@ -70,16 +70,28 @@ struct RobotPath {
   double turn_rate = 0.6;           ///< rad/s, slower where the camera has to turn faster
 };
 
-/// Someone who walks to and fro on a straight line: a body of 0.5 x 0.3 m with a head, 1.7 m high.
+/// A person at one time; feet that carry it stay where they are.
+struct FigurePose {
+  Eigen::Vector3d hip;      ///< between the joints of the legs
+  double yaw = 0.0;         ///< where it looks, rad from +x
+  Eigen::Vector3d foot[2];  ///< soles below the ankles, left and right
+};
+
+/// Someone who walks to and fro on a straight line, a body of 0.5 x 0.3 m with a head, 1.7 m high; or, with a
+/// day, a person with arms and legs.
 struct Walker {
   Eigen::Vector3d from;  ///< middle of the feet
   Eigen::Vector3d to;    ///< at least 1 cm away
   double speed = 0.7;    ///< m/s
   std::string material = "fabric";
   core::ConfigMark mark;
+  std::vector<FigurePose> day;  ///< of a person: poses 0.04 s apart, the last one like the first; it repeats
+  bool carries = false;         ///< of a person: a box in the hands
 
   /// Position of the feet, t seconds after the first frame.
   [[nodiscard]] Eigen::Vector3d at(double t) const;
+  /// Pose of a person, t seconds after the first frame.
+  [[nodiscard]] FigurePose pose(double t) const;
 };
 
 struct Scene {

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "plumbline/synth/plan.hpp"
+#include "plumbline/synth/scene.hpp"
 
 namespace plumbline::synth {
 
@@ -17,6 +17,8 @@ class Ground {
 
   /// Rooms and ways between them, with leaves of doors in the way and nothing else.
   explicit Ground(const Plan& plan);
+  /// The floor of any scene at a height: nothing stands on it or hangs lower than people are high.
+  Ground(const Scene& scene, double floor);
 
   /// Takes cells away; recompute() brings the distances up to date.
   void block(const std::vector<Eigen::Vector2d>& outline, bool hides_view);
@@ -40,6 +42,9 @@ class Ground {
   /// The cheapest way, which keeps away from obstacles where it can (A*); empty if there is none.
   [[nodiscard]] std::vector<Eigen::Vector2d> way(const Eigen::Vector2d& from,
                                                  const Eigen::Vector2d& to) const;
+  /// The same in straight pieces of up to 2 m, with clearance kept.
+  [[nodiscard]] std::vector<Eigen::Vector2d> straight_way(const Eigen::Vector2d& from,
+                                                          const Eigen::Vector2d& to) const;
   [[nodiscard]] bool walkable(const cv::Point& c) const {
     return cv::Rect({0, 0}, distance_.size()).contains(c) && distance_(c) >= static_cast<float>(kClearance);
   }

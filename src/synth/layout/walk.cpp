@@ -63,22 +63,6 @@ void visit(const Plan& plan, int room, Rng& rng, std::vector<char>& seen, std::v
   }
 }
 
-/// Straightens the cells of a way, with clearance kept.
-std::vector<Vector2d> straighten(const std::vector<Vector2d>& cells, const Ground& ground) {
-  std::vector<Vector2d> corners = {cells.front()};
-  for (std::size_t i = 0; i + 1 < cells.size();) {
-    std::size_t best = i + 1;
-    double narrow = 1.0;
-    for (std::size_t j = i + 1; j < cells.size() && (cells[j] - cells[i]).norm() < 2.0; ++j) {
-      narrow = std::min(narrow, ground.clearance(cells[j]));
-      if (ground.clearance(cells[i], cells[j]) >= std::min(0.45, narrow)) best = j;
-    }
-    corners.push_back(cells[best]);
-    i = best;
-  }
-  return corners;
-}
-
 /// Rounds a closed line's corners and thins it out to steps of kStep, with clearance kept.
 std::vector<Vector2d> round_off(const std::vector<Vector2d>& corners, const Ground& ground) {
   std::vector<Vector2d> fine;
@@ -281,16 +265,15 @@ RobotPath try_path(const Plan& plan, const Ground& ground, Route route, int robo
             return (a - way.back()).norm() < (b - way.back()).norm();
           });
 
-      const std::vector<Vector2d> leg = ground.way(way.back(), *nearest);
+      const std::vector<Vector2d> leg = ground.straight_way(way.back(), *nearest);
       if (leg.empty()) return path;
-      const std::vector<Vector2d> straight = straighten(leg, ground);
-      way.insert(way.end(), straight.begin(), straight.end());
+      way.insert(way.end(), leg.begin(), leg.end());
       places.erase(nearest);
     }
   }
   if (way.empty()) return path;
 
-  const std::vector<Vector2d> back = straighten(ground.way(way.back(), way.front()), ground);
+  const std::vector<Vector2d> back = ground.straight_way(way.back(), way.front());
   way.insert(way.end(), back.begin(), back.end());
   const std::vector<Vector2d> line = round_off(way, ground);
   if (line.size() < 4) return path;

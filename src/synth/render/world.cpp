@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <tuple>
 
+#include "plumbline/synth/layout.hpp"
 #include "scene/builder.hpp"
 #include "scene/random.hpp"
 
@@ -24,10 +25,12 @@ World::World(Scene s, SynthOptions o) : scene(std::move(s)), options(std::move(o
   fixed_faces = scene.faces.size();
   const std::size_t walkers = std::min(scene.walkers.size(), static_cast<std::size_t>(options.walkers));
   for (std::size_t i = 0; i < walkers; ++i) {
-    const std::size_t first = scene.faces.size();
-    Builder builder(scene);
-    add_walker(builder, scene.walkers[i]);
-    movers.push_back({scene.walkers[i], first, scene.faces.size() - first});
+    for (int part = 0; part < walker_parts(scene.walkers[i]); ++part) {
+      const std::size_t first = scene.faces.size();
+      Builder builder(scene);
+      add_walker(builder, scene.walkers[i], part);
+      movers.push_back({i, part, first, scene.faces.size() - first});
+    }
   }
   for (const Face& face : scene.faces) materials.push_back(find_material(face.material));
   build_bvh();
@@ -213,15 +216,17 @@ core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const
     }
   }
 
-  if (static_cast<std::size_t>(options.walkers) > scene.walkers.size()) {
-    return core::usage_error(
-        fmt::format("walkers: scene '{}' has {}, not {}; ask for fewer, or add some to a copy of the scene",
-                    scene.name, scene.walkers.size(), options.walkers));
-  }
-
   // Cheap checks come before the second or two of drawing.
   if (auto free = check_paths(scene, options); !free) return tl::unexpected<core::Error>(free.error());
-  auto world = std::make_shared<World>(scene, options);
+
+  Scene peopled = scene;
+  if (!add_people(options.walkers, options.seed, peopled)) {
+    return core::usage_error(
+        fmt::format("walkers: scene '{}' has {}, not {}, and no free floor near its first path for more; ask "
+                    "for fewer, or add some to a copy of the scene",
+                    scene.name, scene.walkers.size(), options.walkers));
+  }
+  auto world = std::make_shared<World>(std::move(peopled), options);
   world->build_textures(executor);
   world->build_light(executor);
   return std::shared_ptr<const World>(world);

@@ -8,6 +8,7 @@
 #include "plumbline/core/executor.hpp"
 #include "plumbline/synth/scene.hpp"
 #include "plumbline/synth/source.hpp"
+#include "scene/builder.hpp"
 
 struct RTCDeviceTy;
 struct RTCSceneTy;
@@ -54,7 +55,8 @@ class World {
 
   /// Faces [first, first + count) of the scene walk: they are where the walk begins and move with the time.
   struct Mover {
-    Walker walker;
+    std::size_t walker = 0;  ///< index into Scene::walkers
+    int part = 0;
     std::size_t first = 0;
     std::size_t count = 0;
   };
@@ -85,6 +87,9 @@ class World {
   /// kPacket rays from one origin; faces[k] = -1 for nothing. dx, dy, dz: directions.
   void cast_packet(const float origin[3], const float* dx, const float* dy, const float* dz,
                    int* faces) const;
+  [[nodiscard]] geometry::Rigid3 motion(const Mover& mover, double t) const {
+    return walker_motion(scene.walkers[mover.walker], mover.part, t);
+  }
   /// True if a point lies inside a solid.
   [[nodiscard]] bool inside_solid(const Eigen::Vector3d& point) const;
 

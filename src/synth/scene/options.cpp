@@ -26,8 +26,8 @@ void SynthOptions::declare(core::OptionTable& table) {
       "Path through a world made from a number: all rooms, a loop through some, random places, or to "
       "the other end and back; scene: as the scene file says, else a tour");
 
-  table.integer("walkers", walkers, {0, 16}, "",
-                "Number of walkers in the scene: filmed, but no part of reference.ply");
+  table.integer("walkers", walkers, {0, 20}, "",
+                "Number of people who walk about: filmed, but no part of reference.ply");
 
   table.choice("texture", texture,
                {{"full", Texture::kFull}, {"weak", Texture::kWeak}, {"none", Texture::kNone}},
