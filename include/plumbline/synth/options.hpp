@@ -20,6 +20,7 @@ struct SynthOptions {
   int robots = 1;              ///< number of recordings
   int layout = -1;             ///< number of a world that is made from it; -1: the scene as its file says
   Route path = Route::kScene;  ///< through a world made from a number
+  std::string changes;         ///< a seed or a file of edits: the same world another day; "": as it is
   int walkers = 0;             ///< number of the scene's walkers to film; they are not in reference.ply
   Texture texture = Texture::kFull;  ///< kNone: white cloth and grey floors, geometry unchanged
   Sensor sensor = Sensor::kKinect;   ///< kIdeal: no noise, no offset between stamps, no blur

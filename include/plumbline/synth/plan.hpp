@@ -28,7 +28,8 @@ struct PlanFace {
 };
 
 struct PlanRoom {
-  std::string kind;             ///< "kitchen", "corridor", ...
+  std::string kind;  ///< "kitchen", "corridor", ...
+  int storey = 0;
   std::vector<PlanFace> faces;  ///< counter-clockwise and closed: the faces' ends are the room's outline
   double height = 2.6;
   std::string floor_material;
@@ -66,6 +67,7 @@ struct PlanOpening {
 
 /// Furniture and columns: the outline on the floor, and the heights between which it stands or hangs.
 struct PlanThing {
+  std::string name;  ///< of the object
   std::string type;
   std::vector<Eigen::Vector2d> outline;  ///< counter-clockwise
   double bottom = 0.0;

@@ -38,8 +38,9 @@ using Progress = std::function<void(std::size_t, std::size_t)>;
 ///                         visible = 1 when some camera saw that spot within the sensor's range and at no
 ///                         grazing angle, else 0. Insides of solids and the world's outer skin are left out.
 ///   OUT/plan.json         only of a world made from a number: rooms, faces of walls, openings, things,
-///   starts OUT/scene.json        what was made: scene, options, seeds, cameras, robot starts and path
-///   lengths, counts
+///   OUT/changes.json      only with changes: what is different from the world as it was made
+///   OUT/scene.json        what was made: scene, options, seeds, cameras, robot starts and path lengths,
+///   counts
 /// Errors: kUsage (options, scene), kOutput (cannot write; names the file). `progress` may be empty; it is
 /// called from one thread at a time.
 core::Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& options,

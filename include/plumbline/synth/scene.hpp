@@ -94,6 +94,26 @@ struct Walker {
   [[nodiscard]] FigurePose pose(double t) const;
 };
 
+/// The leaf of a door that turns: faces [first, first + count) of one object.
+struct DoorLeaf {
+  std::size_t first = 0;
+  std::size_t count = 0;
+  Eigen::Vector3d hinge;  ///< foot of the axis; a leaf opens clockwise, seen from above
+  double open_rad = 0.0;
+};
+
+/// One difference from the world as it was made.
+struct SceneChange {
+  std::string kind;               ///< moved, added, removed, wall, door, light
+  std::string thing;              ///< name of the object
+  std::vector<std::string> with;  ///< names of what stands on it and goes with it
+  Eigen::AlignedBox3d before;     ///< empty if it was not there
+  Eigen::AlignedBox3d after;      ///< empty if it is gone
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();
+  double turn_rad = 0.0;  ///< about the vertical through the middle of `before`; of a leaf about its hinge
+  double factor = 1.0;    ///< of all light
+};
+
 struct Scene {
   std::string name;
   std::string description;
@@ -107,7 +127,9 @@ struct Scene {
   std::vector<RobotPath> robots;      ///< at least one
   std::vector<Walker> walkers;        ///< the options say how many of them are filmed
   std::vector<Event> events;
-  std::optional<Plan> plan;  ///< of a world made from a number
+  std::vector<DoorLeaf> leaves;
+  std::vector<SceneChange> changes;  ///< those of the options, done
+  std::optional<Plan> plan;          ///< of a world made from a number
 };
 
 /// `name_or_file`: a shipped scene (a file of `scenes_folder` without .yaml) or a path. All problems of the

@@ -19,9 +19,10 @@ std::vector<Vector2d> rectangle(const Vector2d& at, double yaw_rad, const Vector
           at + turn * Vector2d(lo.x(), hi.y())};
 }
 
-Ground::Ground(const Plan& plan) {
+Ground::Ground(const Plan& plan, int storey) {
   Eigen::AlignedBox2d box;
   for (const PlanRoom& room : plan.rooms) {
+    if (room.storey != storey) continue;
     for (const PlanFace& face : room.faces) box.extend(face.from);
   }
   origin_ = box.min() - Vector2d(0.5, 0.5);
@@ -30,11 +31,13 @@ Ground::Ground(const Plan& plan) {
   see_ = free_.clone();
 
   for (const PlanRoom& room : plan.rooms) {
+    if (room.storey != storey) continue;
     fill(free_, room.outline(), 1);
     fill(see_, room.outline(), 1);
   }
 
   for (const PlanOpening& o : plan.openings) {
+    if (plan.rooms[static_cast<std::size_t>(o.front)].storey != storey) continue;
     const PlanWall& wall = plan.walls[static_cast<std::size_t>(o.wall)];
     const double yaw = std::atan2(wall.direction.y(), wall.direction.x()), y = 0.5 * o.depth + kCell;
     const auto between = rectangle(wall.origin, yaw, {o.from, -y}, {o.to, y});
@@ -127,6 +130,24 @@ void Ground::fill(cv::Mat1b& grid, const std::vector<Vector2d>& outline, uchar v
 void Ground::block(const std::vector<Vector2d>& outline, bool hides_view) {
   fill(free_, outline, 0);
   if (hides_view) fill(see_, outline, 0);
+}
+
+void Ground::unblock(const std::vector<Vector2d>& outline) { fill(free_, outline, 1); }
+
+bool Ground::is_free(const std::vector<Vector2d>& outline) const {
+  cv::Mat1b inside(free_.size(), uchar{0});
+  fill(inside, outline, 1);
+  return cv::countNonZero(inside) > 0 && cv::countNonZero(inside & (free_ == 0)) == 0;
+}
+
+Ground furnished_ground(const Plan& plan, int storey) {
+  Ground ground(plan, storey);
+  for (const PlanThing& thing : plan.things) {
+    if (plan.rooms[static_cast<std::size_t>(thing.room)].storey == storey)
+      ground.block(thing.outline, thing.top - thing.bottom > 1.4);
+  }
+  ground.recompute();
+  return ground;
 }
 
 void Ground::recompute() {

@@ -12,8 +12,11 @@ namespace plumbline::synth {
 
 namespace {
 
-/// One of the worlds that a number could become; nothing if its rooms cannot all be walked through.
-std::optional<Scene> try_layout(const std::string& kind, const SynthOptions& options, int attempt) {
+/// One of the worlds that a number could become, as it is made or changed; nothing if its rooms cannot all be
+/// walked through.
+core::Result<std::optional<Scene>> try_layout(const std::string& kind, const SynthOptions& options,
+                                              int attempt, bool changed) {
+  const std::optional<Scene> nothing;
   const int number = options.layout;
   const std::uint64_t seed = mix(static_cast<std::uint64_t>(number), static_cast<std::uint64_t>(attempt) + 1,
                                  static_cast<std::uint64_t>(kind[0]));
@@ -22,7 +25,7 @@ std::optional<Scene> try_layout(const std::string& kind, const SynthOptions& opt
   plan.number = number;
 
   Rng cells(seed, 1), rooms(seed, 2), openings(seed, 3), shell(seed, 4), things(seed, 5);
-  if (!add_rooms(draw_cells(kind, cells), rooms, plan) || !add_openings(openings, plan)) return std::nullopt;
+  if (!add_rooms(draw_cells(kind, cells), rooms, plan) || !add_openings(openings, plan)) return nothing;
 
   Scene scene;
   scene.name = fmt::format("{}-{}", kind, number);
@@ -38,12 +41,17 @@ std::optional<Scene> try_layout(const std::string& kind, const SynthOptions& opt
   scene.light_pitch = 0.12;
   for (Lamp& lamp : scene.lamps) lamp.reach = 6.0;
 
+  scene.plan = std::move(plan);
+  if (changed) {
+    if (auto done = apply_changes(options, scene); !done) return tl::unexpected<core::Error>(done.error());
+    ground = furnished_ground(*scene.plan, 0);
+  }
+
   for (int robot = 0; robot < options.robots; ++robot) {
     Rng walk(seed, 16 + static_cast<std::uint64_t>(robot));
-    scene.robots.push_back(plan_path(plan, ground, options.path, robot, walk));
-    if (scene.robots.back().waypoints.empty()) return std::nullopt;
+    scene.robots.push_back(plan_path(*scene.plan, ground, options.path, robot, walk));
+    if (scene.robots.back().waypoints.empty()) return nothing;
   }
-  scene.plan = std::move(plan);
   return scene;
 }
 
@@ -62,7 +70,17 @@ core::Result<Scene> make_layout(const std::string& kind, const SynthOptions& opt
   }
   constexpr int kAttempts = 200;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    if (auto scene = try_layout(kind, options, attempt)) return std::move(*scene);
+    auto scene = try_layout(kind, options, attempt, false);
+    if (!scene) return tl::unexpected<core::Error>(scene.error());
+    if (!*scene) continue;
+    if (options.changes.empty()) return std::move(**scene);
+
+    scene = try_layout(kind, options, attempt, true);
+    if (!scene) return tl::unexpected<core::Error>(scene.error());
+    if (*scene) return std::move(**scene);
+    return core::usage_error(fmt::format(
+        "changes: {} leaves no way into one of the rooms; shut no door and move nothing that cuts it off",
+        options.changes));
   }
   return core::usage_error(
       fmt::format("layout: no {} could be made from the number {}; take another one", kind, options.layout));
@@ -79,7 +97,11 @@ core::Result<Scene> open_scene(const std::string& name_or_file, const SynthOptio
         fmt::format("path: '{}' is for worlds made from a number (layout); the paths of {} are in its file",
                     to_string(options.path), name_or_file));
   }
-  return load_scene(name_or_file, scenes_folder);
+  auto scene = load_scene(name_or_file, scenes_folder);
+  if (scene && !options.changes.empty()) {
+    if (auto done = apply_changes(options, *scene); !done) return tl::unexpected<core::Error>(done.error());
+  }
+  return scene;
 }
 
 }  // namespace plumbline::synth

@@ -26,6 +26,17 @@ void build_shell(const Plan& plan, Rng& rng, Builder& builder);
 /// Furniture and columns; whatever would stand in the way of people is left out.
 void furnish(Plan& plan, Ground& ground, Rng& rng, Builder& builder);
 
+/// Furniture of a type; the frame stands on the floor, its -y side is the front. Other types add nothing.
+void add_thing(Builder& b, const std::string& type, const geometry::Rigid3& frame,
+               const Eigen::Vector3d& size, const std::string& material);
+
+/// The middles of all ways through that a room has.
+std::vector<Eigen::Vector2d> ways_of(const Plan& plan, int room);
+
+/// Does the changes that the options ask for, and writes them into the scene and its plan. Errors: kUsage,
+/// kInput.
+core::Result<void> apply_changes(const SynthOptions& options, Scene& scene);
+
 /// The camera's path, which ends where it began; empty if it finds none.
 RobotPath plan_path(const Plan& plan, const Ground& ground, Route route, int robot, Rng& rng);
 

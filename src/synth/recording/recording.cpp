@@ -125,6 +125,7 @@ nlohmann::json describe_robot(const SynthSource& source, const std::string& fold
 nlohmann::json describe_options(const SynthOptions& o) {
   return {{"frames", o.frames},
           {"robots", o.robots},
+          {"changes", o.changes},
           {"walkers", o.walkers},
           {"texture", to_string(o.texture)},
           {"sensor", to_string(o.sensor)},
@@ -285,6 +286,11 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
     if (scene.plan) coverage = cover(scene, visibility, *counts);
   }
   if (auto ok = write_plan(scene, *sources, coverage, output); !ok) return fail(ok.error());
+
+  if (!options.changes.empty()) {
+    if (auto ok = core::write_file(output / "changes.json", describe_changes(scene)); !ok)
+      return fail(ok.error());
+  }
 
   summary.stopped = stop.stop_requested();
   const std::string json = core::json_text(describe_world(scene, options, summary, *robots));

@@ -26,6 +26,10 @@ void SynthOptions::declare(core::OptionTable& table) {
       "Path through a world made from a number: all rooms, a loop through some, random places, or to "
       "the other end and back; scene: as the scene file says, else a tour");
 
+  table.text(
+      "changes", changes,
+      "The same world another day: a seed, or a YAML file of edits; what has changed is in changes.json");
+
   table.integer("walkers", walkers, {0, 20}, "",
                 "Number of people who walk about: filmed, but no part of reference.ply");
 
