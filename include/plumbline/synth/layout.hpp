@@ -6,7 +6,7 @@
 
 namespace plumbline::synth {
 
-/// Kinds of worlds that a number chooses: "home", "office", "corridor".
+/// Kinds of worlds that a number chooses: "home", "office", "corridor", "building".
 const std::vector<std::string>& layout_kinds();
 
 /// The world of a kind and of the options' number, with its plan and a path for each robot. The same number

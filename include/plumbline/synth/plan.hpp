@@ -55,6 +55,7 @@ struct PlanOpening {
   double head = 2.0;
   double depth = 0.12;    ///< m, the wall's thickness; of a niche its own
   double open_rad = 0.0;  ///< of a leaf that turns
+  int like = -1;          ///< opening of which this is a copy
   int front = 0;          ///< room into which the leaf opens, or which has the window or niche
   int back = -1;          ///< room behind it; -1: none
 
@@ -83,6 +84,8 @@ struct Plan {
   std::vector<PlanOpening> openings;
   std::vector<PlanThing> things;
   std::vector<double> storeys = {0.0};  ///< heights of their floors, m
+  std::vector<int> alike;               ///< rooms with the same walls and furniture
+  bool copies = false;                  ///< these have the same posters as well
 
   /// The middle of an opening, within its wall.
   [[nodiscard]] Eigen::Vector2d middle(const PlanOpening& o) const {

@@ -43,7 +43,13 @@ bool hangs(const std::string& type) {
 struct Editor::Slab {
   Vector2d origin, along, normal;
   double from, to, half;     // m along it, and half its thickness
+  double low, high;          // m: heights of its storey
   std::vector<int> objects;  // its own
+  [[nodiscard]] bool has(const Face& face) const {
+    double z = 1e9;
+    for (const Vector2d& uv : face.polygon) z = std::min(z, face.at(uv.x(), uv.y()).z());
+    return z > low && z < high;
+  }
   [[nodiscard]] bool near(const Vector2d& p, double margin) const {
     const double s = along.dot(p - origin);
     return std::abs(normal.dot(p - origin)) < half + margin && s > from - 0.16 && s < to + 0.16;
@@ -187,7 +193,7 @@ core::Result<void> Editor::add(const Edit& edit) {
 }
 
 std::optional<Editor::Slab> Editor::slab(const std::string& wall) const {
-  Slab slab{{0, 0}, {1, 0}, {0, 1}, 1e9, -1e9, 0.0, {}};
+  Slab slab{{0, 0}, {1, 0}, {0, 1}, 1e9, -1e9, 0.0, -1e9, 1e9, {}};
   const auto extend = [&](const Vector2d& p) {
     slab.from = std::min(slab.from, slab.along.dot(p - slab.origin));
     slab.to = std::max(slab.to, slab.along.dot(p - slab.origin));
@@ -214,6 +220,9 @@ std::optional<Editor::Slab> Editor::slab(const std::string& wall) const {
       for (const PlanFace& face : room.faces) {
         const int object = walls[next++];
         if (face.wall != index) continue;
+        const auto storey = static_cast<std::size_t>(room.storey);
+        slab.low = plan.storeys[storey] - 0.05;
+        slab.high = storey + 1 < plan.storeys.size() ? plan.storeys[storey + 1] - 0.05 : 1e9;
         slab.objects.push_back(object);
         extend(face.from);
         extend(face.to);
@@ -246,7 +255,7 @@ bool Editor::square(const std::string& wall) const {
   return s && std::all_of(scene_.faces.begin(), scene_.faces.end(), [&](const Face& face) {
            const auto& type = scene_.objects[static_cast<std::size_t>(face.object)].type;
            const double across = std::abs(face.normal.head<2>().dot(s->normal));
-           if (!structural(type) || across < 1e-6 || across > 1.0 - 1e-6) return true;
+           if (!structural(type) || !s->has(face) || across < 1e-6 || across > 1.0 - 1e-6) return true;
            if (std::find(s->objects.begin(), s->objects.end(), face.object) != s->objects.end()) return true;
            return std::none_of(face.polygon.begin(), face.polygon.end(), [&](const Vector2d& uv) {
              return s->near(face.at(uv.x(), uv.y()).head<2>(), 0.03);
@@ -270,14 +279,15 @@ core::Result<void> Editor::shift_wall(const Edit& edit) {
   std::vector<char> rigid(scene_.objects.size(), 0);
   for (const int object : s->objects) rigid[static_cast<std::size_t>(object)] = 1;
   for (std::size_t k = 0; k < scene_.objects.size(); ++k) {
-    if (hangs(scene_.objects[k].type) && s->near(box(static_cast<int>(k)).center().head<2>(), 0.06))
+    if (hangs(scene_.objects[k].type) && box(static_cast<int>(k)).center().z() > s->low &&
+        box(static_cast<int>(k)).center().z() < s->high && s->near(box(static_cast<int>(k)).center().head<2>(), 0.06))
       rigid[k] = 1;
   }
 
   for (Face& face : scene_.faces) {
     const auto object = static_cast<std::size_t>(face.object);
     if (rigid[object] != 0) face.origin += by;
-    if (rigid[object] != 0 || !structural(scene_.objects[object].type)) continue;
+    if (rigid[object] != 0 || !structural(scene_.objects[object].type) || !s->has(face)) continue;
     if (std::abs(face.normal.dot(by)) > 1e-6 * by.norm()) continue;
     for (Vector2d& uv : face.polygon) {
       if (s->near(face.at(uv.x(), uv.y()).head<2>(), 0.03))
@@ -291,6 +301,8 @@ core::Result<void> Editor::shift_wall(const Edit& edit) {
   change.after = change.before.translated(by);
   if (!scene_.plan) return {};
   for (PlanRoom& room : scene_.plan->rooms) {
+    const double floor = scene_.plan->storeys[static_cast<std::size_t>(room.storey)];
+    if (floor < s->low || floor > s->high) continue;
     for (PlanFace& face : room.faces) {
       for (Vector2d* p : {&face.from, &face.to}) {
         if (s->near(*p, 0.03)) *p += by.head<2>();

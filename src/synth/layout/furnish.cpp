@@ -124,6 +124,54 @@ class Furnisher {
     }
   }
 
+  /// Furnishes like rooms: the first one, then copies of all that is in it.
+  void fill_alike(double fullness) {
+    Scene& scene = b_.scene();
+    const std::size_t objects = scene.objects.size(), faces = scene.faces.size(), lamps = scene.lamps.size(),
+                      things = plan_.things.size();
+    const auto& like = plan_.alike;
+    fill(like.front(), fullness);
+    const std::size_t ends[] = {scene.objects.size(), scene.faces.size(), scene.lamps.size(), plan_.things.size()};
+
+    for (std::size_t i = 1; i < like.size(); ++i) {
+      const Vector2d way = plan_.rooms[static_cast<std::size_t>(like[i])].faces[0].from -
+                           plan_.rooms[static_cast<std::size_t>(like[0])].faces[0].from;
+      const Vector3d shift(way.x(), way.y(), 0.0);
+      const std::size_t base = scene.objects.size();
+      const auto name = [&](std::size_t object) {
+        return fmt::format("{} {}", scene.objects[object].type, base + object - objects + 1);
+      };
+      for (std::size_t k = objects; k < ends[0]; ++k) {
+        scene.objects.push_back(scene.objects[k]);
+        scene.objects.back().name = name(k);
+      }
+      for (std::size_t k = faces; k < ends[1]; ++k) {
+        Face face = scene.faces[k];
+        const auto object = static_cast<std::size_t>(face.object);
+        const std::string& type = scene.objects[object].type;
+        face.origin += shift;
+        face.object = static_cast<int>(base + object - objects);
+        if (!plan_.copies && (type == "poster" || type == "picture" || type == "sign" || type == "whiteboard"))
+          face.seed = face.object + 1;
+        scene.faces.push_back(std::move(face));
+      }
+      for (std::size_t k = lamps; k < ends[2]; ++k) {
+        scene.lamps.push_back(scene.lamps[k]);
+        scene.lamps.back().center += shift;
+      }
+      for (std::size_t k = things; k < ends[3]; ++k) {
+        PlanThing thing = plan_.things[k];
+        for (Vector2d& p : thing.outline) p += way;
+        thing.room = like[i];
+        for (std::size_t j = objects; j < ends[0]; ++j) {
+          if (scene.objects[j].name == thing.name) thing.name = name(j);
+        }
+        ground_.block(thing.outline, thing.top > 1.4);
+        plan_.things.push_back(std::move(thing));
+      }
+    }
+  }
+
  private:
   [[nodiscard]] const PlanRoom& room() const { return plan_.rooms[static_cast<std::size_t>(room_)]; }
 
@@ -325,7 +373,9 @@ void furnish(Plan& plan, Ground& ground, Rng& rng, Builder& builder) {
   const double usual = rng.uniform(0.1, 1.0);
   for (std::size_t i = 0; i < plan.rooms.size(); ++i) {
     const double fullness = rng.chance(0.08) ? 0.0 : std::min(1.0, usual * rng.uniform(0.6, 1.4));
-    furnisher.fill(static_cast<int>(i), fullness);
+    const bool like = std::find(plan.alike.begin(), plan.alike.end(), static_cast<int>(i)) != plan.alike.end();
+    if (!like) furnisher.fill(static_cast<int>(i), fullness);
+    if (like && static_cast<int>(i) == plan.alike.front()) furnisher.fill_alike(std::max(0.4, fullness));
   }
   ground.recompute();
 }

@@ -249,7 +249,8 @@ std::vector<std::vector<Vector2d>> destinations(const Plan& plan, const Ground& 
   return out;
 }
 
-RobotPath try_path(const Plan& plan, const Ground& ground, Route route, int robot, Rng& rng) {
+RobotPath try_path(const Plan& plan, const Ground& ground, Route route, int robot, Rng& rng,
+                   const std::optional<Vector2d>& start) {
   RobotPath path;
   path.name = fmt::format("robot{}", robot);
   path.speed = rng.uniform(0.55, 0.8);
@@ -257,7 +258,7 @@ RobotPath try_path(const Plan& plan, const Ground& ground, Route route, int robo
 
   std::vector<Vector2d> way;
   for (std::vector<Vector2d>& places : destinations(plan, ground, route, rng)) {
-    if (way.empty()) way = {places.back()};
+    if (way.empty()) way = {start.value_or(places.back())};
 
     while (!places.empty()) {
       const auto nearest =
@@ -285,9 +286,10 @@ RobotPath try_path(const Plan& plan, const Ground& ground, Route route, int robo
 
 }  // namespace
 
-RobotPath plan_path(const Plan& plan, const Ground& ground, Route route, int robot, Rng& rng) {
+RobotPath plan_path(const Plan& plan, const Ground& ground, Route route, int robot, Rng& rng,
+                    const std::optional<Vector2d>& start) {
   for (int tries = 0; tries < 6; ++tries) {
-    RobotPath path = try_path(plan, ground, route, robot, rng);
+    RobotPath path = try_path(plan, ground, route, robot, rng, start);
     if (!path.waypoints.empty() && keeps_clear(path, ground)) return path;
   }
   return {};

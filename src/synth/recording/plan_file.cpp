@@ -65,6 +65,7 @@ ordered_json describe_room(const Plan& plan, const PlanRoom& room) {
                      {"outer", wall.outer}});
   }
   return {{"kind", room.kind},
+          {"storey", room.storey},
           {"outline_m", line(room.outline())},
           {"area_m2", room.area()},
           {"height_m", room.height},
@@ -125,6 +126,8 @@ std::string describe_plan(const Plan& plan, const std::vector<geometry::Rigid3>&
   }
 
   ordered_json file = {{"kind", plan.kind}, {"layout", plan.number}};
+  file["storeys"] = plan.storeys;
+  file["alike"] = plan.alike;
   if (coverage) file["seen"] = coverage->all;
   file["rooms"] = rooms;
   file["openings"] = openings;

@@ -147,6 +147,9 @@ nlohmann::json describe_options(const Scene& scene, const SynthOptions& options)
   if (scene.plan) {
     json["layout"] = options.layout;
     json["path"] = to_string(options.path);
+    json["like"] = options.like;
+    json["copies"] = options.copies;
+    if (scene.plan->kind == "building") json.update({{"floors", options.floors}, {"rooms", options.rooms}});
   }
   return json;
 }
