@@ -280,7 +280,8 @@ core::Result<void> Editor::shift_wall(const Edit& edit) {
   for (const int object : s->objects) rigid[static_cast<std::size_t>(object)] = 1;
   for (std::size_t k = 0; k < scene_.objects.size(); ++k) {
     if (hangs(scene_.objects[k].type) && box(static_cast<int>(k)).center().z() > s->low &&
-        box(static_cast<int>(k)).center().z() < s->high && s->near(box(static_cast<int>(k)).center().head<2>(), 0.06))
+        box(static_cast<int>(k)).center().z() < s->high &&
+        s->near(box(static_cast<int>(k)).center().head<2>(), 0.06))
       rigid[k] = 1;
   }
 

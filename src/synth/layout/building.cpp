@@ -38,7 +38,7 @@ struct Stairwell {
   [[nodiscard]] double bottom() const { return top() - steps_of(pitch) * kGoing; }
   [[nodiscard]] Vector2d entry() const { return {middle(), y1 - 0.5 * kEntry}; }
 
-  /// Where people walk from the entry up to the next storey's; z above this floor.
+  /// The way from the entry up to that of the next storey; z above this floor.
   [[nodiscard]] std::vector<Vector3d> climb() const {
     const double left = 0.5 * (x0 + middle()), right = 0.5 * (x1 + middle());
     std::vector<Vector3d> out = {{0.5 * (left + middle()), y1 - 0.5 * kEntry, 0.0}};
@@ -69,8 +69,9 @@ void build_stairs(const Stairwell& well, int index, bool lowest, bool highest, d
 
   b.begin_object("floor", fmt::format("floor of stairs {}", index), mark);
   if (lowest) {
-    b.polygon({{well.x0, well.y0, 0.0}, {well.x1, well.y0, 0.0}, {well.x1, well.y1, 0.0}, {well.x0, well.y1, 0.0}},
-              Vector3d::UnitX(), {"tiles"});
+    b.polygon(
+        {{well.x0, well.y0, 0.0}, {well.x1, well.y0, 0.0}, {well.x1, well.y1, 0.0}, {well.x0, well.y1, 0.0}},
+        Vector3d::UnitX(), {"tiles"});
   } else {
     solid({well.x0, well.top(), -kSlab}, {well.x1, well.y1, 0.0}, "tiles");
   }
@@ -80,7 +81,10 @@ void build_stairs(const Stairwell& well, int index, bool lowest, bool highest, d
   add_ceiling_lamp(b, upright({m, well.y1 - 0.5 * kEntry, ceiling}, 0.0), 0.5, 0.5, 9.0);
   b.begin_object("stairs", "", mark);
   if (highest) {
-    b.polygon({{well.x0, well.y1, height}, {well.x1, well.y1, height}, {well.x1, well.y0, height}, {well.x0, well.y0, height}},
+    b.polygon({{well.x0, well.y1, height},
+               {well.x1, well.y1, height},
+               {well.x1, well.y0, height},
+               {well.x0, well.y0, height}},
               Vector3d::UnitX(), {"ceiling"});
     if (lowest) return;
     solid({well.x0, well.top() - 0.05, 0.0}, {m - 0.05, well.top(), 1.0}, "paint_grey");
@@ -105,7 +109,8 @@ BuildingFrame draw_frame(const SynthOptions& options, Rng& rng) {
   frame.outer = rng.uniform(0.3, 0.45);
   frame.corridor = rng.uniform(1.7, 2.6);
   frame.stairs = rng.uniform(2.7, 3.1);
-  frame.low = kEntry + kLanding + steps_of(frame.pitch) * kGoing + 0.5 * frame.outer + 0.15 + rng.uniform(0.0, 0.6);
+  frame.low =
+      kEntry + kLanding + steps_of(frame.pitch) * kGoing + 0.5 * frame.outer + 0.15 + rng.uniform(0.0, 0.6);
   const int side = (options.rooms + 1) / 2;
   const double length = std::max({side * rng.uniform(3.4, 4.4), (options.rooms - side) * 3.2 + frame.stairs,
                                   6.5 + 3.2 * std::max(options.like, options.copies), 9.0});
@@ -220,9 +225,10 @@ bool build_building(const SynthOptions& options, std::uint64_t seed, Scene& scen
     const Stairwell well(*stairs, frame.pitch);
     const int index = static_cast<int>(stairs - part.rooms.data());
     build_stairs(well, index, lowest, highest, frame.height, builder);
-    part.things.push_back({"stairs", "stairs",
-                           rectangle({0.0, 0.0}, 0.0, {well.x0 + 0.01, well.y0 + 0.01}, {well.x1 - 0.01, well.top()}),
-                           0.0, frame.pitch, index});
+    part.things.push_back(
+        {"stairs", "stairs",
+         rectangle({0.0, 0.0}, 0.0, {well.x0 + 0.01, well.y0 + 0.01}, {well.x1 - 0.01, well.top()}), 0.0,
+         frame.pitch, index});
 
     Ground ground(part);
     ground.block(part.things.back().outline, false);

@@ -131,7 +131,8 @@ class Furnisher {
                       things = plan_.things.size();
     const auto& like = plan_.alike;
     fill(like.front(), fullness);
-    const std::size_t ends[] = {scene.objects.size(), scene.faces.size(), scene.lamps.size(), plan_.things.size()};
+    const std::size_t ends[] = {scene.objects.size(), scene.faces.size(), scene.lamps.size(),
+                                plan_.things.size()};
 
     for (std::size_t i = 1; i < like.size(); ++i) {
       const Vector2d way = plan_.rooms[static_cast<std::size_t>(like[i])].faces[0].from -
@@ -151,7 +152,8 @@ class Furnisher {
         const std::string& type = scene.objects[object].type;
         face.origin += shift;
         face.object = static_cast<int>(base + object - objects);
-        if (!plan_.copies && (type == "poster" || type == "picture" || type == "sign" || type == "whiteboard"))
+        if (!plan_.copies &&
+            (type == "poster" || type == "picture" || type == "sign" || type == "whiteboard"))
           face.seed = face.object + 1;
         scene.faces.push_back(std::move(face));
       }
@@ -373,7 +375,8 @@ void furnish(Plan& plan, Ground& ground, Rng& rng, Builder& builder) {
   const double usual = rng.uniform(0.1, 1.0);
   for (std::size_t i = 0; i < plan.rooms.size(); ++i) {
     const double fullness = rng.chance(0.08) ? 0.0 : std::min(1.0, usual * rng.uniform(0.6, 1.4));
-    const bool like = std::find(plan.alike.begin(), plan.alike.end(), static_cast<int>(i)) != plan.alike.end();
+    const bool like =
+        std::find(plan.alike.begin(), plan.alike.end(), static_cast<int>(i)) != plan.alike.end();
     if (!like) furnisher.fill(static_cast<int>(i), fullness);
     if (like && static_cast<int>(i) == plan.alike.front()) furnisher.fill_alike(std::max(0.4, fullness));
   }

@@ -79,7 +79,8 @@ core::Result<Scene> make_layout(const std::string& kind, const SynthOptions& opt
         fmt::format("layout: '{}' has no layouts; {} have", kind, fmt::join(kinds, ", ")));
   }
   if (std::max(options.like, options.copies) > 1 && (kind == "home" || kind == "corridor")) {
-    return core::usage_error(fmt::format("like, copies: a {} has no rooms alike; office and building have", kind));
+    return core::usage_error(
+        fmt::format("like, copies: a {} has no rooms alike; office and building have", kind));
   }
   constexpr int kAttempts = 200;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {

@@ -10,18 +10,18 @@
 
 namespace plumbline::synth {
 
-/// Cells of a home, an office or a ring of corridors; cells of the kind "outside" are no rooms. `alike`: rooms
-/// of an office that have the same shape.
+/// Cells of a home, an office or a ring of corridors; cells of the kind "outside" are no rooms. `alike`:
+/// rooms of an office that have the same shape.
 Subdivision draw_cells(const std::string& kind, int alike, Rng& rng);
 
 /// The storeys of a building have the corridor and the stairs in common.
 struct BuildingFrame {
-  Eigen::Vector2d size;             ///< between the middles of the outer walls
-  double low = 5.0, corridor = 2.0; ///< m in y: the rooms below the corridor, and it
-  double stairs = 2.8;              ///< m in x, below the corridor
-  double outer = 0.36;              ///< m, thickness
-  double height = 2.7;              ///< m, largest of a room
-  double pitch = 3.0;               ///< m from floor to floor
+  Eigen::Vector2d size;              ///< between the middles of the outer walls
+  double low = 5.0, corridor = 2.0;  ///< m in y: the rooms below the corridor, and it
+  double stairs = 2.8;               ///< m in x, below the corridor
+  double outer = 0.36;               ///< m, thickness
+  double height = 2.7;               ///< m, largest of a room
+  double pitch = 3.0;                ///< m from floor to floor
 };
 
 /// Cells of one storey.

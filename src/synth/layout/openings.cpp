@@ -280,8 +280,8 @@ bool make_alike(Plan& plan) {
   const auto common = [&](int wall) {
     const auto has = [&](const PlanFace& face) { return face.wall == wall; };
     return std::any_of(room(first).faces.begin(), room(first).faces.end(), has) &&
-           std::any_of(room(second).faces.begin(), room(second).faces.end(), has) && wall != room(first).faces[1].wall &&
-           wall != room(first).faces[3].wall;
+           std::any_of(room(second).faces.begin(), room(second).faces.end(), has) &&
+           wall != room(first).faces[1].wall && wall != room(first).faces[3].wall;
   };
   std::vector<PlanOpening> kept;
   for (const PlanOpening& o : plan.openings) {

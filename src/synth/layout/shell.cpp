@@ -245,7 +245,8 @@ void build_shell(const Plan& plan, Rng& rng, Builder& builder) {
   std::size_t first = 0;
   Rng first_rng = rng;
   for (std::size_t i = 0; i < plan.rooms.size(); ++i) {
-    const bool like = std::find(plan.alike.begin(), plan.alike.end(), static_cast<int>(i)) != plan.alike.end();
+    const bool like =
+        std::find(plan.alike.begin(), plan.alike.end(), static_cast<int>(i)) != plan.alike.end();
     const bool copy = like && static_cast<int>(i) != plan.alike.front();
     const std::size_t begin = faces.size();
     if (like && !copy) {

@@ -64,12 +64,8 @@ ordered_json describe_room(const Plan& plan, const PlanRoom& room) {
                      {"thickness_m", wall.thickness},
                      {"outer", wall.outer}});
   }
-  return {{"kind", room.kind},
-          {"storey", room.storey},
-          {"outline_m", line(room.outline())},
-          {"area_m2", room.area()},
-          {"height_m", room.height},
-          {"faces", faces}};
+  return {{"kind", room.kind},      {"storey", room.storey},   {"outline_m", line(room.outline())},
+          {"area_m2", room.area()}, {"height_m", room.height}, {"faces", faces}};
 }
 
 ordered_json describe_opening(const Plan& plan, const PlanOpening& o) {

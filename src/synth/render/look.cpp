@@ -12,7 +12,7 @@ using Eigen::Vector3d;
 
 TexelScale texel_scale(const World& world, std::size_t face) {
   const Face& f = world.scene.faces[face];
-  const Texture2d::Level& top = world.textures[static_cast<std::size_t>(world.texture_of[face])].levels[0];
+  const cv::Size& top = world.texture_sizes[static_cast<std::size_t>(world.texture_of[face])];
   const double tile = world.tile_m[face];
   const bool tiled =
       f.stretch_u <= 0.0 || (world.options.texture == Texture::kNone && world.materials[face]->large);

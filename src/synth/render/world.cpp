@@ -156,7 +156,7 @@ void World::cast_packet(const float origin[3], const float* dx, const float* dy,
   }
 }
 
-void World::build_textures(const core::Executor& executor) {
+void World::prepare_textures() {
   // Faces of one material share a texture when it tiles; a print that is stretched is drawn for its seed and
   // shape.
   struct Job {
@@ -196,14 +196,15 @@ void World::build_textures(const core::Executor& executor) {
     }
   }
 
-  textures.resize(jobs.size());
-  executor.parallel_for(jobs.size(), [&](std::size_t k) {
-    textures[k] = draw_texture(*jobs[k].material, options.texture, jobs[k].seed, jobs[k].aspect);
+  for (const Job& job : jobs)
+    texture_sizes.push_back(texture_size(*job.material, options.texture, job.aspect));
+  textures.prepare(jobs.size(), [jobs, texture = options.texture](std::size_t k) {
+    return draw_texture(*jobs[k].material, texture, jobs[k].seed, jobs[k].aspect);
   });
 }
 
 core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const SynthOptions& options,
-                                                       const core::Executor& executor) {
+                                                       const core::Executor&) {
   if (auto ok = check(options); !ok) return tl::unexpected<core::Error>(ok.error());
   if (scene.faces.empty())
     return core::usage_error(fmt::format("scene '{}' has no surfaces; add `objects:`", scene.name));
@@ -216,9 +217,6 @@ core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const
     }
   }
 
-  // Cheap checks come before the second or two of drawing.
-  if (auto free = check_paths(scene, options); !free) return tl::unexpected<core::Error>(free.error());
-
   Scene peopled = scene;
   if (!add_people(options.walkers, options.seed, peopled)) {
     return core::usage_error(
@@ -227,8 +225,9 @@ core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const
                     scene.name, scene.walkers.size(), options.walkers));
   }
   auto world = std::make_shared<World>(std::move(peopled), options);
-  world->build_textures(executor);
-  world->build_light(executor);
+  if (auto free = check_paths(world); !free) return tl::unexpected<core::Error>(free.error());
+  world->prepare_textures();
+  world->prepare_light();
   return std::shared_ptr<const World>(world);
 }
 

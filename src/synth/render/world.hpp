@@ -8,6 +8,7 @@
 #include "plumbline/core/executor.hpp"
 #include "plumbline/synth/scene.hpp"
 #include "plumbline/synth/source.hpp"
+#include "render/on_demand.hpp"
 #include "scene/builder.hpp"
 
 struct RTCDeviceTy;
@@ -67,15 +68,16 @@ class World {
   std::vector<Mover> movers;
   std::vector<Event> events;               ///< of scene and options
   std::vector<const Material*> materials;  ///< per face
-  std::vector<LightMap> light;             ///< per face
-  std::vector<Texture2d> textures;
-  std::vector<int> texture_of;  ///< per face
-  std::vector<double> tile_m;   ///< per face: metres one copy of a tiled texture covers
-  std::vector<float> offset_u;  ///< per face: shift of tiled textures, metres
+  OnDemand<LightMap> light;                ///< per face
+  OnDemand<Texture2d> textures;
+  std::vector<cv::Size> texture_sizes;  ///< px, of level 0
+  std::vector<int> texture_of;          ///< per face
+  std::vector<double> tile_m;           ///< per face: metres one copy of a tiled texture covers
+  std::vector<float> offset_u;          ///< per face: shift of tiled textures, metres
   std::vector<float> offset_v;
 
-  void build_textures(const core::Executor& executor);
-  void build_light(const core::Executor& executor);
+  void prepare_textures();
+  void prepare_light();
 
   /// First thing along a ray; direction need not be unit (distance is in its lengths).
   [[nodiscard]] Hit cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double far) const;

@@ -47,7 +47,9 @@ double floor_area(const Scene& scene, std::size_t index) {
   const std::string name = "floor of " + scene.plan->rooms[index].kind + " " + std::to_string(number);
   const double floor = scene.plan->storeys[static_cast<std::size_t>(scene.plan->rooms[index].storey)];
   for (const Face& face : scene.faces) {
-    if (scene.objects[static_cast<std::size_t>(face.object)].name == name && std::abs(face.origin.z() - floor) < 1e-9) area += signed_area(face.polygon);
+    if (scene.objects[static_cast<std::size_t>(face.object)].name == name &&
+        std::abs(face.origin.z() - floor) < 1e-9)
+      area += signed_area(face.polygon);
   }
   return area;
 }
@@ -122,7 +124,8 @@ void check_ways(const Scene& scene) {
       a = b = static_cast<char>(a | b);
     }
     bool climbed = false;
-    for (std::size_t r = 0; r < plan.rooms.size(); ++r) climbed = climbed || (plan.rooms[r].kind == "stairs" && reached[r] != 0);
+    for (std::size_t r = 0; r < plan.rooms.size(); ++r)
+      climbed = climbed || (plan.rooms[r].kind == "stairs" && reached[r] != 0);
     for (std::size_t r = 0; r < plan.rooms.size(); ++r) {
       if (plan.rooms[r].kind == "stairs" && climbed) reached[r] = 1;
     }
@@ -133,7 +136,8 @@ void check_ways(const Scene& scene) {
     const auto& waypoints = scene.robots[0].waypoints;
     EXPECT_TRUE(std::any_of(waypoints.begin(), waypoints.end(),
                             [&](const Waypoint& w) {
-                              const double up = w.position.z() - plan.storeys[static_cast<std::size_t>(room.storey)];
+                              const double up =
+                                  w.position.z() - plan.storeys[static_cast<std::size_t>(room.storey)];
                               return up > 1.0 && up < 2.0 && room.contains(w.position.head<2>());
                             }))
         << scene.name << ": " << room.kind;
@@ -149,7 +153,9 @@ void check_things(const Scene& scene) {
     for (const Vector2d& p : thing.outline)
       EXPECT_TRUE(scene.plan->rooms[static_cast<std::size_t>(thing.room)].contains(p)) << scene.name;
     for (const PlanThing& other : scene.plan->things) {
-      const auto storey = [&](const PlanThing& t) { return scene.plan->rooms[static_cast<std::size_t>(t.room)].storey; };
+      const auto storey = [&](const PlanThing& t) {
+        return scene.plan->rooms[static_cast<std::size_t>(t.room)].storey;
+      };
       if (storey(other) != storey(thing)) continue;
       Vector2d middle = Vector2d::Zero();
       for (const Vector2d& p : other.outline) middle += 0.25 * p;
@@ -296,11 +302,12 @@ std::multiset<std::string> contents(const Scene& scene, int room, bool prints) {
     const Eigen::AlignedBox2d b = face.bounds();
     const Eigen::Vector3d p = face.at(b.center().x(), b.center().y()) + 0.001 * face.normal;
     const double up = p.z() - scene.plan->storeys[static_cast<std::size_t>(r.storey)];
-    if (!r.contains(p.head<2>()) || up < -0.01 || up > r.height || (prints && face.stretch_u == 0.0)) continue;
+    if (!r.contains(p.head<2>()) || up < -0.01 || up > r.height || (prints && face.stretch_u == 0.0))
+      continue;
     const Vector2d d = p.head<2>() - r.faces[0].from;
     char text[120];
-    std::snprintf(text, sizeof text, "%s %.3f %.3f %.3f %d", type.c_str(), d.x() + 1e-6, d.y() + 1e-6, up + 1e-6,
-                  prints ? face.seed : 0);
+    std::snprintf(text, sizeof text, "%s %.3f %.3f %.3f %d", type.c_str(), d.x() + 1e-6, d.y() + 1e-6,
+                  up + 1e-6, prints ? face.seed : 0);
     out.insert(text);
   }
   return out;
@@ -336,7 +343,8 @@ TEST(SynthLayoutNumbers, SceneWithoutLayoutsIsRefused) {
   options.layout = 3;
   const auto none = open_scene("room", options, std::string(PLUMBLINE_SOURCE_DIR) + "/pipelines/scenes");
   ASSERT_FALSE(none);
-  EXPECT_NE(none.error().message.find("home, office, corridor, building"), std::string::npos) << none.error().message;
+  EXPECT_NE(none.error().message.find("home, office, corridor, building"), std::string::npos)
+      << none.error().message;
   SynthOptions laps;
   laps.path = Route::kLaps;
   EXPECT_FALSE(open_scene("room", laps, std::string(PLUMBLINE_SOURCE_DIR) + "/pipelines/scenes"));
