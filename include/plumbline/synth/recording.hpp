@@ -21,8 +21,10 @@ struct WriteSummary {
   std::size_t reference_samples = 0;  ///< points of reference.ply
   std::size_t reference_visible = 0;  ///< of these seen by a camera within the sensor's range
   double reference_spacing_m = 0.0;
-  bool stopped = false;  ///< ended early; the files are complete up to the last frame listed
-  double wall_s = 0.0;   ///< of rendering and writing the frames
+  std::size_t openings = 0;       ///< of a world made from a number
+  std::size_t openings_seen = 0;  ///< those of whose jambs the cameras saw half or more
+  bool stopped = false;           ///< ended early; the files are complete up to the last frame listed
+  double wall_s = 0.0;            ///< of rendering and writing the frames
 };
 
 /// Frames written so far, frames in all.

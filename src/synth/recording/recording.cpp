@@ -125,7 +125,6 @@ nlohmann::json describe_robot(const SynthSource& source, const std::string& fold
 nlohmann::json describe_options(const SynthOptions& o) {
   return {{"frames", o.frames},
           {"robots", o.robots},
-          {"changes", o.changes},
           {"walkers", o.walkers},
           {"texture", to_string(o.texture)},
           {"sensor", to_string(o.sensor)},
@@ -144,6 +143,7 @@ nlohmann::json describe_options(const SynthOptions& o) {
 /// With the options that only worlds made from a number have.
 nlohmann::json describe_options(const Scene& scene, const SynthOptions& options) {
   nlohmann::json json = describe_options(options);
+  if (!options.changes.empty()) json["changes"] = options.changes;
   if (scene.plan) {
     json["layout"] = options.layout;
     json["path"] = to_string(options.path);
@@ -156,18 +156,20 @@ nlohmann::json describe_options(const Scene& scene, const SynthOptions& options)
 
 nlohmann::json describe_world(const Scene& scene, const SynthOptions& options, const WriteSummary& summary,
                               const nlohmann::json& robots) {
-  return {{"scene", scene.name},
-          {"scene_file", scene.file.filename().string()},
-          {"description", scene.description},
-          {"version", core::version()},
-          {"options", describe_options(scene, options)},
-          {"robots", robots},
-          {"reference",
-           {{"file", "reference.ply"},
-            {"spacing_m", summary.reference_spacing_m},
-            {"samples", summary.reference_samples},
-            {"visible", summary.reference_visible}}},
-          {"complete", !summary.stopped}};
+  nlohmann::json json = {{"scene", scene.name},
+                         {"scene_file", scene.file.filename().string()},
+                         {"description", scene.description},
+                         {"version", core::version()},
+                         {"options", describe_options(scene, options)},
+                         {"robots", robots},
+                         {"reference",
+                          {{"file", "reference.ply"},
+                           {"spacing_m", summary.reference_spacing_m},
+                           {"samples", summary.reference_samples},
+                           {"visible", summary.reference_visible}}},
+                         {"complete", !summary.stopped}};
+  if (scene.plan) json["openings"] = {{"count", summary.openings}, {"seen", summary.openings_seen}};
+  return json;
 }
 
 std::string folder_name(int robot) { return fmt::format("robot{}", robot); }
@@ -287,6 +289,10 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
     summary.reference_samples = counts->samples;
     summary.reference_visible = counts->visible;
     if (scene.plan) coverage = cover(scene, visibility, *counts);
+    for (const double seen : coverage ? coverage->jambs : std::vector<double>{}) {
+      ++summary.openings;
+      summary.openings_seen += seen >= 0.5 ? 1 : 0;
+    }
   }
   if (auto ok = write_plan(scene, *sources, coverage, output); !ok) return fail(ok.error());
 
