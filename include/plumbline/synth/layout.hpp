@@ -6,7 +6,7 @@
 
 namespace plumbline::synth {
 
-/// Kinds of worlds that a number chooses: "home", "office", "corridor".
+/// Kinds of worlds that a number chooses: "home", "office", "corridor", "building".
 const std::vector<std::string>& layout_kinds();
 
 /// The world of a kind and of the options' number, with its plan and a path for each robot. The same number
@@ -16,5 +16,9 @@ core::Result<Scene> make_layout(const std::string& kind, const SynthOptions& opt
 /// A scene file or, if the options have a layout, the world of that number.
 core::Result<Scene> open_scene(const std::string& name_or_file, const SynthOptions& options,
                                const std::filesystem::path& scenes_folder);
+
+/// Adds people who walk about near the path of the scene's first robot until the scene has `count` walkers.
+/// False if the floor has no room for them.
+bool add_people(int count, int seed, Scene& scene);
 
 }  // namespace plumbline::synth

@@ -19,7 +19,12 @@ struct SynthOptions {
   int frames = -1;             ///< per robot; -1: the path once; more than the path has: it starts again
   int robots = 1;              ///< number of recordings
   int layout = -1;             ///< number of a world that is made from it; -1: the scene as its file says
+  int floors = 3;              ///< storeys of a building
+  int rooms = 10;              ///< of each storey of a building, besides corridor and stairs
+  int like = 0;                ///< rooms with the same walls and furniture, of an office or of each storey
+  int copies = 0;              ///< the same with the same posters
   Route path = Route::kScene;  ///< through a world made from a number
+  std::string changes;         ///< a seed or a file of edits: the same world another day; "": as it is
   int walkers = 0;             ///< number of the scene's walkers to film; they are not in reference.ply
   Texture texture = Texture::kFull;  ///< kNone: white cloth and grey floors, geometry unchanged
   Sensor sensor = Sensor::kKinect;   ///< kIdeal: no noise, no offset between stamps, no blur

@@ -28,7 +28,8 @@ struct PlanFace {
 };
 
 struct PlanRoom {
-  std::string kind;             ///< "kitchen", "corridor", ...
+  std::string kind;  ///< "kitchen", "corridor", ...
+  int storey = 0;
   std::vector<PlanFace> faces;  ///< counter-clockwise and closed: the faces' ends are the room's outline
   double height = 2.6;
   std::string floor_material;
@@ -54,6 +55,7 @@ struct PlanOpening {
   double head = 2.0;
   double depth = 0.12;    ///< m, the wall's thickness; of a niche its own
   double open_rad = 0.0;  ///< of a leaf that turns
+  int like = -1;          ///< opening of which this is a copy
   int front = 0;          ///< room into which the leaf opens, or which has the window or niche
   int back = -1;          ///< room behind it; -1: none
 
@@ -66,6 +68,7 @@ struct PlanOpening {
 
 /// Furniture and columns: the outline on the floor, and the heights between which it stands or hangs.
 struct PlanThing {
+  std::string name;  ///< of the object
   std::string type;
   std::vector<Eigen::Vector2d> outline;  ///< counter-clockwise
   double bottom = 0.0;
@@ -80,6 +83,9 @@ struct Plan {
   std::vector<PlanRoom> rooms;
   std::vector<PlanOpening> openings;
   std::vector<PlanThing> things;
+  std::vector<double> storeys = {0.0};  ///< heights of their floors, m
+  std::vector<int> alike;               ///< rooms with the same walls and furniture
+  bool copies = false;                  ///< these have the same posters as well
 
   /// The middle of an opening, within its wall.
   [[nodiscard]] Eigen::Vector2d middle(const PlanOpening& o) const {

@@ -21,8 +21,10 @@ struct WriteSummary {
   std::size_t reference_samples = 0;  ///< points of reference.ply
   std::size_t reference_visible = 0;  ///< of these seen by a camera within the sensor's range
   double reference_spacing_m = 0.0;
-  bool stopped = false;  ///< ended early; the files are complete up to the last frame listed
-  double wall_s = 0.0;   ///< of rendering and writing the frames
+  std::size_t openings = 0;       ///< of a world made from a number
+  std::size_t openings_seen = 0;  ///< those of whose jambs the cameras saw half or more
+  bool stopped = false;           ///< ended early; the files are complete up to the last frame listed
+  double wall_s = 0.0;            ///< of rendering and writing the frames
 };
 
 /// Frames written so far, frames in all.
@@ -40,8 +42,9 @@ using Progress = std::function<void(std::size_t, std::size_t)>;
 ///                         visible = 1 when some camera saw that spot within the sensor's range and at no
 ///                         grazing angle, else 0. Insides of solids and the world's outer skin are left out.
 ///   OUT/plan.json         only of a world made from a number: rooms, faces of walls, openings, things,
-///   starts OUT/scene.json        what was made: scene, options, seeds, cameras, robot starts and path
-///   lengths, counts
+///   OUT/changes.json      only with changes: what is different from the world as it was made
+///   OUT/scene.json        what was made: scene, options, seeds, cameras, robot starts and path lengths,
+///   counts
 /// Errors: kUsage (options, scene), kOutput (cannot write; names the file). `progress` may be empty; it is
 /// called from one thread at a time.
 core::Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& options,

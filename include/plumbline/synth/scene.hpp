@@ -70,16 +70,48 @@ struct RobotPath {
   double turn_rate = 0.6;           ///< rad/s, slower where the camera has to turn faster
 };
 
-/// Someone who walks to and fro on a straight line: a body of 0.5 x 0.3 m with a head, 1.7 m high.
+/// A person at one time; feet that carry it stay where they are.
+struct FigurePose {
+  Eigen::Vector3d hip;      ///< between the joints of the legs
+  double yaw = 0.0;         ///< where it looks, rad from +x
+  Eigen::Vector3d foot[2];  ///< soles below the ankles, left and right
+};
+
+/// Someone who walks to and fro on a straight line, a body of 0.5 x 0.3 m with a head, 1.7 m high; or, with a
+/// day, a person with arms and legs.
 struct Walker {
   Eigen::Vector3d from;  ///< middle of the feet
   Eigen::Vector3d to;    ///< at least 1 cm away
   double speed = 0.7;    ///< m/s
   std::string material = "fabric";
   core::ConfigMark mark;
+  std::vector<FigurePose> day;  ///< of a person: poses 0.04 s apart, the last one like the first; it repeats
+  bool carries = false;         ///< of a person: a box in the hands
 
   /// Position of the feet, t seconds after the first frame.
   [[nodiscard]] Eigen::Vector3d at(double t) const;
+  /// Pose of a person, t seconds after the first frame.
+  [[nodiscard]] FigurePose pose(double t) const;
+};
+
+/// The leaf of a door that turns: faces [first, first + count) of one object.
+struct DoorLeaf {
+  std::size_t first = 0;
+  std::size_t count = 0;
+  Eigen::Vector3d hinge;  ///< foot of the axis; a leaf opens clockwise, seen from above
+  double open_rad = 0.0;
+};
+
+/// One difference from the world as it was made.
+struct SceneChange {
+  std::string kind;               ///< moved, added, removed, wall, door, light
+  std::string thing;              ///< name of the object
+  std::vector<std::string> with;  ///< names of what stands on it and goes with it
+  Eigen::AlignedBox3d before;     ///< empty if it was not there
+  Eigen::AlignedBox3d after;      ///< empty if it is gone
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();
+  double turn_rad = 0.0;  ///< about the vertical through the middle of `before`; of a leaf about its hinge
+  double factor = 1.0;    ///< of all light
 };
 
 struct Scene {
@@ -95,7 +127,9 @@ struct Scene {
   std::vector<RobotPath> robots;      ///< at least one
   std::vector<Walker> walkers;        ///< the options say how many of them are filmed
   std::vector<Event> events;
-  std::optional<Plan> plan;  ///< of a world made from a number
+  std::vector<DoorLeaf> leaves;
+  std::vector<SceneChange> changes;  ///< those of the options, done
+  std::optional<Plan> plan;          ///< of a world made from a number
 };
 
 /// `name_or_file`: a shipped scene (a file of `scenes_folder` without .yaml) or a path. All problems of the

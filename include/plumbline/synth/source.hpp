@@ -15,7 +15,8 @@ namespace plumbline::synth {
 
 class World;  // scene made ready to render: textures, light maps, BVH
 
-/// Builds textures, light maps and BVH (the part that takes a second or two); shared by all robots.
+/// Makes a scene ready to film, for all robots; checks that their paths are free. Textures and light are made
+/// when a picture first needs them.
 core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const SynthOptions& options,
                                                        const core::Executor& executor);
 
@@ -78,7 +79,7 @@ class SynthSource final : public dataset::FrameSource {
 
  private:
   struct Impl;
-  friend core::Result<void> check_paths(const Scene& scene, const SynthOptions& options);
+  friend core::Result<void> check_paths(const std::shared_ptr<const World>& world);
   static core::Result<std::unique_ptr<Impl>> plan(std::shared_ptr<const World> world, int robot);
   explicit SynthSource(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
@@ -87,6 +88,7 @@ class SynthSource final : public dataset::FrameSource {
 /// Checks that every robot's path is free, without building textures and light. The error names the segment
 /// and the object.
 core::Result<void> check_paths(const Scene& scene, const SynthOptions& options);
+core::Result<void> check_paths(const std::shared_ptr<const World>& world);
 
 /// Opens "synth:SCENE?key=value&..."; keys are those of SynthOptions and `robot` (0 .. robots-1).
 /// Unknown scenes and keys are errors with a suggestion.

@@ -2,6 +2,7 @@
 // plumbline synth SCENE -o DIR
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 #include <system_error>
 
@@ -44,6 +45,12 @@ core::Result<void> film(SynthRequest& request, Session& session) {
   if (!summary) return tl::unexpected<core::Error>(summary.error());
 
   if (!session.quiet) {
+    if (summary->openings > 0) {
+      print("the cameras saw {:.0f} % of all surface, and the jambs of {} of {} openings\n",
+            100.0 * static_cast<double>(summary->reference_visible) /
+                static_cast<double>(std::max<std::size_t>(1, summary->reference_samples)),
+            summary->openings_seen, summary->openings);
+    }
     print("{}{} robots, {} frames, {:.1f} m of path, {} reference points in {}\n",
           summary->stopped ? "stopped early: " : "", summary->robots, summary->frames, summary->path_m,
           summary->reference_samples, request.output.string());

@@ -109,13 +109,26 @@ void make_hall(Subdivision& s, Rng& rng) {
   }
 }
 
-Subdivision draw_office(Rng& rng) {
+/// Cuts off `alike` rooms of one width, and one before them that keeps them from the outer wall.
+void slice_alike(Subdivision& s, int index, int alike, Rng& rng) {
+  const Eigen::AlignedBox2d box = s.bounds(cell(s, index));
+  const double width = std::min(rng.uniform(3.0, 4.2), (box.sizes().x() - 6.0) / alike);
+  const double thickness = inner_wall(rng), first = box.min().x() + rng.uniform(2.6, 3.0);
+  for (int i = 0; alike > 1 && i <= alike; ++i) {
+    const auto left = s.split(index, {first + i * width, box.center().y()}, Vector2d::UnitY(), thickness);
+    if (left && i > 0) cell(s, *left).kind = "alike";
+  }
+}
+
+Subdivision draw_office(int alike, Rng& rng) {
   const double corridor = rng.uniform(1.5, 2.6), low = rng.uniform(3.6, 6.5), high = rng.uniform(3.6, 6.5);
-  Subdivision s({rng.uniform(16.0, 30.0), low + corridor + high}, rng.uniform(0.28, 0.45));
+  const double length = std::max(rng.uniform(16.0, 30.0), alike > 1 ? 6.5 + 3.2 * alike : 0.0);
+  Subdivision s({length, low + corridor + high}, rng.uniform(0.28, 0.45));
   const int middle = cut(s, 0, 1, low + corridor, rng, false).value_or(0);
   const int lowest = cut(s, middle, 1, low, rng, false).value_or(0);
   cell(s, middle).kind = "corridor";
 
+  if (alike > 1) slice_alike(s, 0, alike, rng);
   slice(s, 0, 2.4, rng.uniform(5.0, 9.0), rng);
   slice(s, lowest, 2.4, rng.uniform(5.0, 9.0), rng);
   if (rng.chance(0.35)) make_hall(s, rng);
@@ -159,9 +172,41 @@ Subdivision draw_corridors(Rng& rng) {
 
 }  // namespace
 
-Subdivision draw_cells(const std::string& kind, Rng& rng) {
+Subdivision draw_cells(const std::string& kind, int alike, Rng& rng) {
   if (kind == "home") return draw_home(rng);
-  return kind == "office" ? draw_office(rng) : draw_corridors(rng);
+  return kind == "office" ? draw_office(alike, rng) : draw_corridors(rng);
+}
+
+namespace {
+
+/// Rooms side by side along a strip, so many of them.
+void slice_into(Subdivision& s, int index, int count, Rng& rng) {
+  for (; count > 1; --count) {
+    const Eigen::AlignedBox2d box = s.bounds(cell(s, index));
+    cut(s, index, 0, box.min().x() + box.sizes().x() / count * rng.uniform(0.75, 1.25), rng);
+  }
+}
+
+}  // namespace
+
+Subdivision draw_storey(const BuildingFrame& frame, int rooms, int alike, Rng& rng) {
+  Subdivision s(frame.size, frame.outer);
+  constexpr double kThickness = 0.24;
+  const auto level = [&](int index, double y) {
+    return s.split(index, {0.0, y}, -Vector2d::UnitX(), kThickness).value_or(0);
+  };
+  const int middle = level(0, frame.low + frame.corridor);
+  const int lowest = level(middle, frame.low);
+  cell(s, middle).kind = "corridor";
+  const int stairs = s.split(lowest, {frame.stairs, 0.0}, Vector2d::UnitY(), kThickness).value_or(0);
+  cell(s, stairs).kind = "stairs";
+
+  const int high = std::max((rooms + 1) / 2, alike > 1 ? alike + 2 : 0);
+  if (alike > 1) slice_alike(s, 0, alike, rng);
+  slice_into(s, 0, high - (alike > 1 ? alike + 1 : 0), rng);
+  slice_into(s, lowest, std::max(1, rooms - high), rng);
+  if (alike < 2 && rng.chance(0.5)) make_hall(s, rng);
+  return s;
 }
 
 namespace {
@@ -208,6 +253,16 @@ bool add_rooms(const Subdivision& cells, Rng& rng, Plan& plan) {
       largest = plan.rooms.size() - 1;
   }
 
+  // Like rooms begin with the outer wall, so that their faces correspond.
+  for (std::size_t i = 0; i < plan.rooms.size(); ++i) {
+    PlanRoom& room = plan.rooms[i];
+    if (room.kind != "alike") continue;
+    const auto outer = std::min_element(room.faces.begin(), room.faces.end(),
+                                        [](const PlanFace& a, const PlanFace& b) { return a.wall < b.wall; });
+    std::rotate(room.faces.begin(), outer, room.faces.end());
+    plan.alike.push_back(static_cast<int>(i));
+  }
+
   const std::string usual = rng.pick(std::vector<std::string>{"plaster", "plaster", "paint_white"});
   for (std::size_t i = 0; i < plan.rooms.size(); ++i) {
     PlanRoom& room = plan.rooms[i];
@@ -216,7 +271,7 @@ bool add_rooms(const Subdivision& cells, Rng& rng, Plan& plan) {
     if (area < 4.0 && limited) return false;
     if (area > 60.0 && limited) return false;
 
-    if (limited) room.kind = room_kind(plan.kind, area, i == largest, rng);
+    if (limited || room.kind == "alike") room.kind = room_kind(plan.kind, area, i == largest, rng);
 
     room.height = rng.chance(0.3) ? std::max(2.3, storey - rng.uniform(0.1, 0.4)) : storey;
     room.floor_material = floor_of(room.kind, rng);
@@ -226,6 +281,12 @@ bool add_rooms(const Subdivision& cells, Rng& rng, Plan& plan) {
     room.accent_material = rng.chance(0.25)
                                ? rng.pick(std::vector<std::string>{"brick", "wood", "poster_wall"})
                                : room.wall_material;
+  }
+  for (const int like : plan.alike) {
+    PlanRoom &room = plan.rooms[static_cast<std::size_t>(like)],
+             copy = plan.rooms[static_cast<std::size_t>(plan.alike.front())];
+    copy.faces = room.faces;
+    room = copy;
   }
   return plan.rooms.size() > 1;
 }

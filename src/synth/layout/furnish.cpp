@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <sstream>
@@ -104,32 +106,6 @@ std::string pick_word(const std::string& words, Rng& rng) {
   return rng.pick(list);
 }
 
-void build_item(Builder& b, const Item& item) {
-  const std::string type = item.rule->type;
-  const Vector3d& s = item.size;
-  const Vector2d half = 0.5 * s.head<2>();
-
-  if (type == "desk") add_desk(b, item.frame, s, item.material);
-  if (type == "table") add_table(b, item.frame, s, item.material);
-  if (type == "shelf") add_shelf(b, item.frame, s, item.material, true);
-  if (type == "sofa") add_sofa(b, item.frame, s, item.material);
-  if (type == "cabinet")
-    add_cabinet(b, item.frame, s, item.material, std::max(1, static_cast<int>(s.x() / 0.55)));
-
-  if (type == "plant") add_plant(b, item.frame, s.z());
-  if (type == "floor_lamp") add_floor_lamp(b, item.frame, s.z(), 1.5);
-  if (type == "box" || type == "column")
-    b.box(item.frame, {-half.x(), -half.y(), 0.0}, {half.x(), half.y(), s.z()}, {item.material});
-
-  if (type == "bed") {
-    b.box(item.frame, {-half.x(), -half.y(), 0.08}, {half.x(), half.y(), 0.55 * s.z()}, {"wood"});
-    b.box(item.frame, {-half.x() + 0.02, -half.y() + 0.02, 0.55 * s.z()},
-          {half.x() - 0.02, half.y() - 0.06, s.z()}, {item.material});
-    b.box(item.frame, {-half.x(), half.y() - 0.05, 0.0}, {half.x(), half.y(), s.z() + 0.45}, {"wood"});
-    b.box(item.frame, {-0.3, half.y() - 0.5, s.z()}, {0.3, half.y() - 0.1, s.z() + 0.1}, {"cloth"});
-  }
-}
-
 class Furnisher {
  public:
   Furnisher(Plan& plan, Ground& ground, Rng& rng, Builder& builder)
@@ -145,6 +121,56 @@ class Furnisher {
       if (rule.rooms.find(r.kind) == std::string::npos) continue;
       const double share = rule.type == "column" ? 1.0 : 2.2 * fullness;
       for (int n = static_cast<int>(r.area() * rule.per_m2 * share + rng_.uniform()); n > 0; --n) add(rule);
+    }
+  }
+
+  /// Furnishes like rooms: the first one, then copies of all that is in it.
+  void fill_alike(double fullness) {
+    Scene& scene = b_.scene();
+    const std::size_t objects = scene.objects.size(), faces = scene.faces.size(), lamps = scene.lamps.size(),
+                      things = plan_.things.size();
+    const auto& like = plan_.alike;
+    fill(like.front(), fullness);
+    const std::size_t ends[] = {scene.objects.size(), scene.faces.size(), scene.lamps.size(),
+                                plan_.things.size()};
+
+    for (std::size_t i = 1; i < like.size(); ++i) {
+      const Vector2d way = plan_.rooms[static_cast<std::size_t>(like[i])].faces[0].from -
+                           plan_.rooms[static_cast<std::size_t>(like[0])].faces[0].from;
+      const Vector3d shift(way.x(), way.y(), 0.0);
+      const std::size_t base = scene.objects.size();
+      const auto name = [&](std::size_t object) {
+        return fmt::format("{} {}", scene.objects[object].type, base + object - objects + 1);
+      };
+      for (std::size_t k = objects; k < ends[0]; ++k) {
+        scene.objects.push_back(scene.objects[k]);
+        scene.objects.back().name = name(k);
+      }
+      for (std::size_t k = faces; k < ends[1]; ++k) {
+        Face face = scene.faces[k];
+        const auto object = static_cast<std::size_t>(face.object);
+        const std::string& type = scene.objects[object].type;
+        face.origin += shift;
+        face.object = static_cast<int>(base + object - objects);
+        if (!plan_.copies &&
+            (type == "poster" || type == "picture" || type == "sign" || type == "whiteboard"))
+          face.seed = face.object + 1;
+        scene.faces.push_back(std::move(face));
+      }
+      for (std::size_t k = lamps; k < ends[2]; ++k) {
+        scene.lamps.push_back(scene.lamps[k]);
+        scene.lamps.back().center += shift;
+      }
+      for (std::size_t k = things; k < ends[3]; ++k) {
+        PlanThing thing = plan_.things[k];
+        for (Vector2d& p : thing.outline) p += way;
+        thing.room = like[i];
+        for (std::size_t j = objects; j < ends[0]; ++j) {
+          if (scene.objects[j].name == thing.name) thing.name = name(j);
+        }
+        ground_.block(thing.outline, thing.top > 1.4);
+        plan_.things.push_back(std::move(thing));
+      }
     }
   }
 
@@ -224,7 +250,7 @@ class Furnisher {
     if (!put(type, item.frame, half, item.size.z())) return false;
 
     begin(type);
-    build_item(b_, item);
+    add_thing(b_, type, item.frame, item.size, item.material);
     add_company(item);
 
     // Nothing hangs behind a high thing, where it would not be seen.
@@ -243,9 +269,11 @@ class Furnisher {
     const std::vector<Vector2d> outline = rectangle(at, yaw, -half, half);
     if (!free(outline, height)) return false;
 
-    if (!ground_.try_block(outline, height > 1.4, room().outline(), ways(), kLeastFloor)) return false;
+    if (!ground_.try_block(outline, height > 1.4, room().outline(), ways_of(plan_, room_), kLeastFloor))
+      return false;
     taken_.push_back(outline);
-    plan_.things.push_back({type, outline, 0.0, height, room_});
+    plan_.things.push_back(
+        {fmt::format("{} {}", type, b_.scene().objects.size() + 1), type, outline, 0.0, height, room_});
     return true;
   }
 
@@ -269,15 +297,6 @@ class Furnisher {
     const double yaw = std::atan2(wall.direction.y(), wall.direction.x()), y = 0.5 * wall.thickness + 0.25;
     return (o.front == room_ || o.back == room_) &&
            overlap(outline, rectangle(wall.origin, yaw, {o.from, -y}, {o.to, y}));
-  }
-
-  /// The middles of all ways through that the room has.
-  [[nodiscard]] std::vector<Vector2d> ways() const {
-    std::vector<Vector2d> out;
-    for (const PlanOpening& o : plan_.openings) {
-      if (o.passable() && (o.front == room_ || o.back == room_)) out.push_back(plan_.middle(o));
-    }
-    return out;
   }
 
   /// Things on it and chairs before it.
@@ -326,12 +345,40 @@ class Furnisher {
 
 }  // namespace
 
+void add_thing(Builder& b, const std::string& type, const Rigid3& frame, const Vector3d& s,
+               const std::string& material) {
+  const Vector2d half = 0.5 * s.head<2>();
+
+  if (type == "desk") add_desk(b, frame, s, material);
+  if (type == "chair") add_chair(b, frame, material);
+  if (type == "table") add_table(b, frame, s, material);
+  if (type == "shelf") add_shelf(b, frame, s, material, true);
+  if (type == "sofa") add_sofa(b, frame, s, material);
+  if (type == "cabinet") add_cabinet(b, frame, s, material, std::max(1, static_cast<int>(s.x() / 0.55)));
+
+  if (type == "plant") add_plant(b, frame, s.z());
+  if (type == "floor_lamp") add_floor_lamp(b, frame, s.z(), 1.5);
+  if (type == "box" || type == "column")
+    b.box(frame, {-half.x(), -half.y(), 0.0}, {half.x(), half.y(), s.z()}, {material});
+
+  if (type == "bed") {
+    b.box(frame, {-half.x(), -half.y(), 0.08}, {half.x(), half.y(), 0.55 * s.z()}, {"wood"});
+    b.box(frame, {-half.x() + 0.02, -half.y() + 0.02, 0.55 * s.z()},
+          {half.x() - 0.02, half.y() - 0.06, s.z()}, {material});
+    b.box(frame, {-half.x(), half.y() - 0.05, 0.0}, {half.x(), half.y(), s.z() + 0.45}, {"wood"});
+    b.box(frame, {-0.3, half.y() - 0.5, s.z()}, {0.3, half.y() - 0.1, s.z() + 0.1}, {"cloth"});
+  }
+}
+
 void furnish(Plan& plan, Ground& ground, Rng& rng, Builder& builder) {
   Furnisher furnisher(plan, ground, rng, builder);
   const double usual = rng.uniform(0.1, 1.0);
   for (std::size_t i = 0; i < plan.rooms.size(); ++i) {
     const double fullness = rng.chance(0.08) ? 0.0 : std::min(1.0, usual * rng.uniform(0.6, 1.4));
-    furnisher.fill(static_cast<int>(i), fullness);
+    const bool like =
+        std::find(plan.alike.begin(), plan.alike.end(), static_cast<int>(i)) != plan.alike.end();
+    if (!like) furnisher.fill(static_cast<int>(i), fullness);
+    if (like && static_cast<int>(i) == plan.alike.front()) furnisher.fill_alike(std::max(0.4, fullness));
   }
   ground.recompute();
 }

@@ -19,9 +19,10 @@ std::vector<Vector2d> rectangle(const Vector2d& at, double yaw_rad, const Vector
           at + turn * Vector2d(lo.x(), hi.y())};
 }
 
-Ground::Ground(const Plan& plan) {
+Ground::Ground(const Plan& plan, int storey) {
   Eigen::AlignedBox2d box;
   for (const PlanRoom& room : plan.rooms) {
+    if (room.storey != storey) continue;
     for (const PlanFace& face : room.faces) box.extend(face.from);
   }
   origin_ = box.min() - Vector2d(0.5, 0.5);
@@ -30,11 +31,13 @@ Ground::Ground(const Plan& plan) {
   see_ = free_.clone();
 
   for (const PlanRoom& room : plan.rooms) {
+    if (room.storey != storey) continue;
     fill(free_, room.outline(), 1);
     fill(see_, room.outline(), 1);
   }
 
   for (const PlanOpening& o : plan.openings) {
+    if (plan.rooms[static_cast<std::size_t>(o.front)].storey != storey) continue;
     const PlanWall& wall = plan.walls[static_cast<std::size_t>(o.wall)];
     const double yaw = std::atan2(wall.direction.y(), wall.direction.x()), y = 0.5 * o.depth + kCell;
     const auto between = rectangle(wall.origin, yaw, {o.from, -y}, {o.to, y});
@@ -51,6 +54,59 @@ Ground::Ground(const Plan& plan) {
       block(rectangle(hinge.head<2>(), turn, {0.0, -0.05}, {o.width(), 0.06}), true);
     }
   }
+  recompute();
+}
+
+Ground::Ground(const Scene& scene, double floor) {
+  const auto outline = [](const Face& face) {
+    std::vector<Vector2d> out;
+    for (const Vector2d& uv : face.polygon) out.emplace_back(face.at(uv.x(), uv.y()).head<2>());
+    if (signed_area(out) < 0.0) std::reverse(out.begin(), out.end());
+    return out;
+  };
+  const auto is_floor = [&](const Face& face) {
+    return face.normal.z() > 0.99 && std::abs(face.origin.z() - floor) < 0.03;
+  };
+
+  Eigen::AlignedBox2d box;
+  for (const Face& face : scene.faces) {
+    if (!is_floor(face)) continue;
+    for (const Vector2d& p : outline(face)) box.extend(p);
+  }
+  const bool bare = box.isEmpty();  // without a floor people walk on nothing, near the paths
+  for (const RobotPath& robot : scene.robots) {
+    for (const Waypoint& w : robot.waypoints) {
+      for (const double d : {-2.0, 2.0}) box.extend(Vector2d(w.position.head<2>() + Vector2d(d, d)));
+    }
+  }
+  origin_ = box.min();
+  const Vector2d cells = box.sizes() / kCell;
+  free_ = cv::Mat1b(static_cast<int>(cells.y()) + 1, static_cast<int>(cells.x()) + 1, uchar(bare ? 1 : 0));
+  for (const Face& face : scene.faces) {
+    if (is_floor(face)) fill(free_, outline(face), 1);
+  }
+
+  for (const Face& face : scene.faces) {
+    double low = 1e9, high = -1e9;
+    for (const Vector2d& uv : face.polygon) {
+      const double z = face.at(uv.x(), uv.y()).z() - floor;
+      low = std::min(low, z);
+      high = std::max(high, z);
+    }
+    if (high < 0.1 || low > 1.8) continue;
+
+    const std::vector<Vector2d> corners = outline(face);
+    fill(free_, corners, 0);
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      const Vector2d edge = corners[(i + 1) % corners.size()] - corners[i];
+      const int steps = 1 + static_cast<int>(2.0 * edge.norm() / kCell);
+      for (int k = 0; k <= steps; ++k) {
+        const cv::Point c = cell_of(corners[i] + static_cast<double>(k) / steps * edge);
+        if (cv::Rect({0, 0}, free_.size()).contains(c)) free_(c) = 0;
+      }
+    }
+  }
+  see_ = free_.clone();
   recompute();
 }
 
@@ -74,6 +130,24 @@ void Ground::fill(cv::Mat1b& grid, const std::vector<Vector2d>& outline, uchar v
 void Ground::block(const std::vector<Vector2d>& outline, bool hides_view) {
   fill(free_, outline, 0);
   if (hides_view) fill(see_, outline, 0);
+}
+
+void Ground::unblock(const std::vector<Vector2d>& outline) { fill(free_, outline, 1); }
+
+bool Ground::is_free(const std::vector<Vector2d>& outline) const {
+  cv::Mat1b inside(free_.size(), uchar{0});
+  fill(inside, outline, 1);
+  return cv::countNonZero(inside) > 0 && cv::countNonZero(inside & (free_ == 0)) == 0;
+}
+
+Ground furnished_ground(const Plan& plan, int storey) {
+  Ground ground(plan, storey);
+  for (const PlanThing& thing : plan.things) {
+    if (plan.rooms[static_cast<std::size_t>(thing.room)].storey == storey)
+      ground.block(thing.outline, thing.top - thing.bottom > 1.4);
+  }
+  ground.recompute();
+  return ground;
 }
 
 void Ground::recompute() {
@@ -215,6 +289,23 @@ std::vector<Vector2d> Ground::way(const Vector2d& from, const Vector2d& to) cons
     way.push_back(middle_of({cell % columns, cell / columns}));
   std::reverse(way.begin(), way.end());
   return way;
+}
+
+std::vector<Vector2d> Ground::straight_way(const Vector2d& from, const Vector2d& to) const {
+  const std::vector<Vector2d> cells = way(from, to);
+  if (cells.empty()) return {};
+  std::vector<Vector2d> corners = {cells.front()};
+  for (std::size_t i = 0; i + 1 < cells.size();) {
+    std::size_t best = i + 1;
+    double narrow = 1.0;
+    for (std::size_t j = i + 1; j < cells.size() && (cells[j] - cells[i]).norm() < 2.0; ++j) {
+      narrow = std::min(narrow, clearance(cells[j]));
+      if (clearance(cells[i], cells[j]) >= std::min(0.45, narrow)) best = j;
+    }
+    corners.push_back(cells[best]);
+    i = best;
+  }
+  return corners;
 }
 
 }  // namespace plumbline::synth

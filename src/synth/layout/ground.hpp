@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "plumbline/synth/plan.hpp"
+#include "plumbline/synth/scene.hpp"
 
 namespace plumbline::synth {
 
@@ -16,11 +16,16 @@ class Ground {
   static constexpr double kClearance = 0.24;  ///< m from the middle of a person to anything
 
   /// Rooms and ways between them, with leaves of doors in the way and nothing else.
-  explicit Ground(const Plan& plan);
+  explicit Ground(const Plan& plan, int storey = 0);
+  /// The floor of any scene at a height: nothing stands on it or hangs lower than people are high.
+  Ground(const Scene& scene, double floor);
 
   /// Takes cells away; recompute() brings the distances up to date.
   void block(const std::vector<Eigen::Vector2d>& outline, bool hides_view);
+  void unblock(const std::vector<Eigen::Vector2d>& outline);
   void recompute();
+  /// Nothing stands within an outline.
+  [[nodiscard]] bool is_free(const std::vector<Eigen::Vector2d>& outline) const;
   /// Blocks an outline within a room, unless less than `least` of the room's floor could then be walked on
   /// without leaving it from each of the places `ways`.
   bool try_block(const std::vector<Eigen::Vector2d>& outline, bool hides_view,
@@ -40,6 +45,9 @@ class Ground {
   /// The cheapest way, which keeps away from obstacles where it can (A*); empty if there is none.
   [[nodiscard]] std::vector<Eigen::Vector2d> way(const Eigen::Vector2d& from,
                                                  const Eigen::Vector2d& to) const;
+  /// The same in straight pieces of up to 2 m, with clearance kept.
+  [[nodiscard]] std::vector<Eigen::Vector2d> straight_way(const Eigen::Vector2d& from,
+                                                          const Eigen::Vector2d& to) const;
   [[nodiscard]] bool walkable(const cv::Point& c) const {
     return cv::Rect({0, 0}, distance_.size()).contains(c) && distance_(c) >= static_cast<float>(kClearance);
   }
@@ -53,6 +61,9 @@ class Ground {
   cv::Mat1b see_;       ///< 1: nothing there reaches to the eyes
   cv::Mat1f distance_;  ///< m
 };
+
+/// A storey with all things that stand on it.
+Ground furnished_ground(const Plan& plan, int storey);
 
 /// The four corners of a rectangle in a frame.
 std::vector<Eigen::Vector2d> rectangle(const Eigen::Vector2d& at, double yaw_rad, const Eigen::Vector2d& lo,

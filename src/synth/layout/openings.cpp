@@ -255,4 +255,57 @@ bool add_openings(Rng& rng, Plan& plan) {
   return true;
 }
 
+bool connected(const Plan& plan) {
+  std::vector<char> reached(plan.rooms.size(), 0);
+  reached[0] = 1;
+  for (std::size_t round = 0; round < plan.rooms.size(); ++round) {
+    for (const PlanOpening& o : plan.openings) {
+      if (!o.passable()) continue;
+      char &a = reached[static_cast<std::size_t>(o.front)], &b = reached[static_cast<std::size_t>(o.back)];
+      a = b = static_cast<char>(a | b);
+    }
+  }
+  return std::all_of(reached.begin(), reached.end(), [](char r) { return r != 0; });
+}
+
+bool make_alike(Plan& plan) {
+  if (plan.alike.size() < 2) return true;
+  const auto room = [&](int index) -> const PlanRoom& { return plan.rooms[static_cast<std::size_t>(index)]; };
+  const int first = plan.alike.front(), second = plan.alike[1];
+  const auto is_alike = [&](int index) {
+    return std::find(plan.alike.begin(), plan.alike.end(), index) != plan.alike.end();
+  };
+
+  // Openings of the first room stay in the walls that all of them have.
+  const auto common = [&](int wall) {
+    const auto has = [&](const PlanFace& face) { return face.wall == wall; };
+    return std::any_of(room(first).faces.begin(), room(first).faces.end(), has) &&
+           std::any_of(room(second).faces.begin(), room(second).faces.end(), has) &&
+           wall != room(first).faces[1].wall && wall != room(first).faces[3].wall;
+  };
+  std::vector<PlanOpening> kept;
+  for (const PlanOpening& o : plan.openings) {
+    const bool of_first = o.front == first || o.back == first;
+    if (of_first ? common(o.wall) : !is_alike(o.front) && !is_alike(o.back)) kept.push_back(o);
+  }
+
+  const std::size_t count = kept.size();
+  for (const int other : plan.alike) {
+    if (other == first) continue;
+    const Vector2d shift = room(other).faces[0].from - room(first).faces[0].from;
+    for (std::size_t i = 0; i < count; ++i) {
+      PlanOpening o = kept[i];
+      if (o.front != first && o.back != first) continue;
+      const double along = plan.walls[static_cast<std::size_t>(o.wall)].direction.dot(shift);
+      o.from += along;
+      o.to += along;
+      (o.front == first ? o.front : o.back) = other;
+      o.like = static_cast<int>(i);
+      kept.push_back(o);
+    }
+  }
+  plan.openings = std::move(kept);
+  return connected(plan);
+}
+
 }  // namespace plumbline::synth

@@ -90,6 +90,7 @@ class Shell {
       add_face(index, room.faces[i], i == 0 ? room.accent_material : room.wall_material);
     }
 
+    if (room.kind == "stairs") return;  // floors and lamps are the stairs' own
     const auto parts = convex_parts(room.outline());
     for (const bool floor : {true, false}) {
       b_.begin_object(floor ? "floor" : "ceiling", fmt::format("{} of {}", floor ? "floor" : "ceiling", name),
@@ -236,8 +237,33 @@ class Shell {
 
 void build_shell(const Plan& plan, Rng& rng, Builder& builder) {
   Shell shell(plan, builder);
-  for (std::size_t i = 0; i < plan.rooms.size(); ++i) shell.add_room(static_cast<int>(i), rng);
-  for (const PlanOpening& o : plan.openings) shell.add_opening(o);
+  std::vector<Face>& faces = builder.scene().faces;
+  const auto adopt = [&](std::size_t from, std::size_t to) {  // the textures of what is the same
+    for (std::size_t i = to; i < faces.size(); ++i) faces[i].seed = faces[from + i - to].seed;
+  };
+
+  std::size_t first = 0;
+  Rng first_rng = rng;
+  for (std::size_t i = 0; i < plan.rooms.size(); ++i) {
+    const bool like =
+        std::find(plan.alike.begin(), plan.alike.end(), static_cast<int>(i)) != plan.alike.end();
+    const bool copy = like && static_cast<int>(i) != plan.alike.front();
+    const std::size_t begin = faces.size();
+    if (like && !copy) {
+      first = begin;
+      first_rng = rng;
+    }
+    Rng same = first_rng;
+    shell.add_room(static_cast<int>(i), copy ? same : rng);
+    if (copy) adopt(first, begin);
+  }
+
+  std::vector<std::size_t> begins;
+  for (const PlanOpening& o : plan.openings) {
+    begins.push_back(faces.size());
+    shell.add_opening(o);
+    if (o.like >= 0) adopt(begins[static_cast<std::size_t>(o.like)], begins.back());
+  }
 }
 
 }  // namespace plumbline::synth

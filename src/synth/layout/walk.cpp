@@ -63,22 +63,6 @@ void visit(const Plan& plan, int room, Rng& rng, std::vector<char>& seen, std::v
   }
 }
 
-/// Straightens the cells of a way, with clearance kept.
-std::vector<Vector2d> straighten(const std::vector<Vector2d>& cells, const Ground& ground) {
-  std::vector<Vector2d> corners = {cells.front()};
-  for (std::size_t i = 0; i + 1 < cells.size();) {
-    std::size_t best = i + 1;
-    double narrow = 1.0;
-    for (std::size_t j = i + 1; j < cells.size() && (cells[j] - cells[i]).norm() < 2.0; ++j) {
-      narrow = std::min(narrow, ground.clearance(cells[j]));
-      if (ground.clearance(cells[i], cells[j]) >= std::min(0.45, narrow)) best = j;
-    }
-    corners.push_back(cells[best]);
-    i = best;
-  }
-  return corners;
-}
-
 /// Rounds a closed line's corners and thins it out to steps of kStep, with clearance kept.
 std::vector<Vector2d> round_off(const std::vector<Vector2d>& corners, const Ground& ground) {
   std::vector<Vector2d> fine;
@@ -265,7 +249,8 @@ std::vector<std::vector<Vector2d>> destinations(const Plan& plan, const Ground& 
   return out;
 }
 
-RobotPath try_path(const Plan& plan, const Ground& ground, Route route, int robot, Rng& rng) {
+RobotPath try_path(const Plan& plan, const Ground& ground, Route route, int robot, Rng& rng,
+                   const std::optional<Vector2d>& start) {
   RobotPath path;
   path.name = fmt::format("robot{}", robot);
   path.speed = rng.uniform(0.55, 0.8);
@@ -273,7 +258,7 @@ RobotPath try_path(const Plan& plan, const Ground& ground, Route route, int robo
 
   std::vector<Vector2d> way;
   for (std::vector<Vector2d>& places : destinations(plan, ground, route, rng)) {
-    if (way.empty()) way = {places.back()};
+    if (way.empty()) way = {start.value_or(places.back())};
 
     while (!places.empty()) {
       const auto nearest =
@@ -281,16 +266,15 @@ RobotPath try_path(const Plan& plan, const Ground& ground, Route route, int robo
             return (a - way.back()).norm() < (b - way.back()).norm();
           });
 
-      const std::vector<Vector2d> leg = ground.way(way.back(), *nearest);
+      const std::vector<Vector2d> leg = ground.straight_way(way.back(), *nearest);
       if (leg.empty()) return path;
-      const std::vector<Vector2d> straight = straighten(leg, ground);
-      way.insert(way.end(), straight.begin(), straight.end());
+      way.insert(way.end(), leg.begin(), leg.end());
       places.erase(nearest);
     }
   }
   if (way.empty()) return path;
 
-  const std::vector<Vector2d> back = straighten(ground.way(way.back(), way.front()), ground);
+  const std::vector<Vector2d> back = ground.straight_way(way.back(), way.front());
   way.insert(way.end(), back.begin(), back.end());
   const std::vector<Vector2d> line = round_off(way, ground);
   if (line.size() < 4) return path;
@@ -302,9 +286,10 @@ RobotPath try_path(const Plan& plan, const Ground& ground, Route route, int robo
 
 }  // namespace
 
-RobotPath plan_path(const Plan& plan, const Ground& ground, Route route, int robot, Rng& rng) {
+RobotPath plan_path(const Plan& plan, const Ground& ground, Route route, int robot, Rng& rng,
+                    const std::optional<Vector2d>& start) {
   for (int tries = 0; tries < 6; ++tries) {
-    RobotPath path = try_path(plan, ground, route, robot, rng);
+    RobotPath path = try_path(plan, ground, route, robot, rng, start);
     if (!path.waypoints.empty() && keeps_clear(path, ground)) return path;
   }
   return {};

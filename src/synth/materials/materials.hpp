@@ -47,6 +47,9 @@ struct Texture2d {
 /// The material that is used: without texture walls are cloth, floors lino, and the rest is plain.
 Material worn(const Material& material, Texture texture);
 
+/// Size of level 0 of the texture of a material.
+cv::Size texture_size(const Material& material, Texture texture, double aspect);
+
 /// Draws the texture of a material; `aspect` = width / height of the surface for prints that are not tiled.
 Texture2d draw_texture(const Material& material, Texture texture, std::uint64_t seed, double aspect);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Textures are drawn once, when a world is built, and stored with mip levels.
+// Textures are drawn once, when a picture first needs them, and stored with mip levels.
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
@@ -52,11 +52,15 @@ Material worn(const Material& material, Texture texture) {
   return m;
 }
 
+cv::Size texture_size(const Material& material, Texture texture, double aspect) {
+  const Material m = worn(material, texture);
+  if (aspect <= 0.0) return {m.pixels, m.pixels};
+  return {power_of_two(m.pixels * std::min(1.0, aspect)), power_of_two(m.pixels / std::max(1.0, aspect))};
+}
+
 Texture2d draw_texture(const Material& material, Texture texture, std::uint64_t seed, double aspect) {
   const Material m = worn(material, texture);
-  cv::Size size(m.pixels, m.pixels);
-  if (aspect > 0.0)
-    size = {power_of_two(m.pixels * std::min(1.0, aspect)), power_of_two(m.pixels / std::max(1.0, aspect))};
+  const cv::Size size = texture_size(material, texture, aspect);
 
   Canvas canvas;
   if (aspect > 0.0) {

@@ -64,11 +64,8 @@ ordered_json describe_room(const Plan& plan, const PlanRoom& room) {
                      {"thickness_m", wall.thickness},
                      {"outer", wall.outer}});
   }
-  return {{"kind", room.kind},
-          {"outline_m", line(room.outline())},
-          {"area_m2", room.area()},
-          {"height_m", room.height},
-          {"faces", faces}};
+  return {{"kind", room.kind},      {"storey", room.storey},   {"outline_m", line(room.outline())},
+          {"area_m2", room.area()}, {"height_m", room.height}, {"faces", faces}};
 }
 
 ordered_json describe_opening(const Plan& plan, const PlanOpening& o) {
@@ -104,7 +101,8 @@ std::string describe_plan(const Plan& plan, const std::vector<geometry::Rigid3>&
   for (const PlanRoom& room : plan.rooms) rooms.push_back(describe_room(plan, room));
   for (const PlanOpening& o : plan.openings) openings.push_back(describe_opening(plan, o));
   for (const PlanThing& thing : plan.things) {
-    things.push_back({{"type", thing.type},
+    things.push_back({{"name", thing.name},
+                      {"type", thing.type},
                       {"room", thing.room},
                       {"outline_m", line(thing.outline)},
                       {"bottom_m", thing.bottom},
@@ -124,12 +122,36 @@ std::string describe_plan(const Plan& plan, const std::vector<geometry::Rigid3>&
   }
 
   ordered_json file = {{"kind", plan.kind}, {"layout", plan.number}};
+  file["storeys"] = plan.storeys;
+  file["alike"] = plan.alike;
   if (coverage) file["seen"] = coverage->all;
   file["rooms"] = rooms;
   file["openings"] = openings;
   file["things"] = things;
   file["robots"] = robots;
   return core::json_text(file, 1);
+}
+
+std::string describe_changes(const Scene& scene) {
+  const auto corners = [](const Eigen::AlignedBox3d& box) -> ordered_json {
+    if (box.isEmpty()) return nullptr;
+    return {{box.min().x(), box.min().y(), box.min().z()}, {box.max().x(), box.max().y(), box.max().z()}};
+  };
+  ordered_json changes = ordered_json::array();
+  for (const SceneChange& c : scene.changes) {
+    changes.push_back({{"kind", c.kind}});
+    if (c.kind == "light") {
+      changes.back()["factor"] = c.factor;
+      continue;
+    }
+    changes.back().update({{"thing", c.thing},
+                           {"with", c.with},
+                           {"box_before_m", corners(c.before)},
+                           {"box_after_m", corners(c.after)},
+                           {"offset_m", {c.offset.x(), c.offset.y(), c.offset.z()}},
+                           {"turn_deg", c.turn_rad * 180.0 / M_PI}});
+  }
+  return core::json_text(ordered_json{{"scene", scene.name}, {"changes", changes}}, 1);
 }
 
 }  // namespace plumbline::synth

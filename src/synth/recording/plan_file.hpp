@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "plumbline/geometry/rigid3.hpp"
-#include "plumbline/synth/plan.hpp"
+#include "plumbline/synth/scene.hpp"
 
 namespace plumbline::synth {
 
@@ -22,5 +22,8 @@ struct PlanCoverage {
 /// left out.
 std::string describe_plan(const Plan& plan, const std::vector<geometry::Rigid3>& starts,
                           const std::optional<PlanCoverage>& coverage);
+
+/// changes.json: what is different from the world as it was made.
+std::string describe_changes(const Scene& scene);
 
 }  // namespace plumbline::synth

@@ -232,9 +232,13 @@ nlohmann::json describe_options(const SynthOptions& o) {
 /// With the options that not all worlds have.
 nlohmann::json describe_options(const Scene& scene, const SynthOptions& options) {
   nlohmann::json json = describe_options(options);
+  if (!options.changes.empty()) json["changes"] = options.changes;
   if (scene.plan) {
     json["layout"] = options.layout;
     json["path"] = to_string(options.path);
+    json["like"] = options.like;
+    json["copies"] = options.copies;
+    if (scene.plan->kind == "building") json.update({{"floors", options.floors}, {"rooms", options.rooms}});
   }
 
   // Newer options are there only if they are used.
@@ -255,18 +259,20 @@ nlohmann::json describe_options(const Scene& scene, const SynthOptions& options)
 
 nlohmann::json describe_world(const Scene& scene, const SynthOptions& options, const WriteSummary& summary,
                               const nlohmann::json& robots) {
-  return {{"scene", scene.name},
-          {"scene_file", scene.file.filename().string()},
-          {"description", scene.description},
-          {"version", core::version()},
-          {"options", describe_options(scene, options)},
-          {"robots", robots},
-          {"reference",
-           {{"file", "reference.ply"},
-            {"spacing_m", summary.reference_spacing_m},
-            {"samples", summary.reference_samples},
-            {"visible", summary.reference_visible}}},
-          {"complete", !summary.stopped}};
+  nlohmann::json json = {{"scene", scene.name},
+                         {"scene_file", scene.file.filename().string()},
+                         {"description", scene.description},
+                         {"version", core::version()},
+                         {"options", describe_options(scene, options)},
+                         {"robots", robots},
+                         {"reference",
+                          {{"file", "reference.ply"},
+                           {"spacing_m", summary.reference_spacing_m},
+                           {"samples", summary.reference_samples},
+                           {"visible", summary.reference_visible}}},
+                         {"complete", !summary.stopped}};
+  if (scene.plan) json["openings"] = {{"count", summary.openings}, {"seen", summary.openings_seen}};
+  return json;
 }
 
 std::string folder_name(int robot) { return fmt::format("robot{}", robot); }
@@ -399,8 +405,17 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
     summary.reference_samples = counts->samples;
     summary.reference_visible = counts->visible;
     if (scene.plan) coverage = cover(scene, visibility, *counts);
+    for (const double seen : coverage ? coverage->jambs : std::vector<double>{}) {
+      ++summary.openings;
+      summary.openings_seen += seen >= 0.5 ? 1 : 0;
+    }
   }
   if (auto ok = write_plan(scene, *sources, coverage, output); !ok) return fail(ok.error());
+
+  if (!options.changes.empty()) {
+    if (auto ok = core::write_file(output / "changes.json", describe_changes(scene)); !ok)
+      return fail(ok.error());
+  }
 
   summary.stopped = stop.stop_requested();
   const std::string json = core::json_text(describe_world(scene, options, summary, *robots));

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 #include <opencv2/imgproc.hpp>
 
 #include "plumbline/sensor/rectify.hpp"
@@ -102,7 +103,9 @@ struct SynthSource::Impl {
   std::shared_ptr<const CameraPath> path;
   std::vector<Stamps> frames;
   NoiseTiles tiles;
-  std::vector<float> gains;  ///< automatic exposure, every kGainStep frames
+  mutable std::vector<float> gains;  ///< automatic exposure, every kGainStep frames, as far as it was needed
+  mutable float level = 0.0F;        ///< of the last of them
+  mutable std::mutex gains_mutex;
   static constexpr int kGainStep = 10;
 
   /// Pose of the camera, which looks ahead along the path if it is not one of a rig.
@@ -122,7 +125,6 @@ struct SynthSource::Impl {
     return camera.depth ? *camera.depth : camera.color;
   }
   [[nodiscard]] core::Result<void> check_way() const;
-  void set_exposure();
   [[nodiscard]] float gain(std::int64_t number) const;
   /// Factor of faults on the gain of a frame's row that is taken at `stamp`.
   [[nodiscard]] float row_gain(const Stamps& at, double stamp) const {
@@ -178,20 +180,17 @@ core::Result<void> SynthSource::Impl::check_way() const {
   return {};
 }
 
-void SynthSource::Impl::set_exposure() {
+float SynthSource::Impl::gain(std::int64_t number) const {
   const sensor::Camera small = make_camera(world->options.sensor, 64, 48, world->options.fps);
-  const auto last = static_cast<std::size_t>(frames.back().number) / kGainStep + 2;
-  float level = 0.0F;
-  for (std::size_t i = 0; i < last; ++i) {
+  const auto k = static_cast<std::size_t>(number / kGainStep);
+  const std::lock_guard<std::mutex> lock(gains_mutex);
+  for (std::size_t i = gains.size(); i < k + 2; ++i) {
     const double t = static_cast<double>(i * kGainStep) / world->options.fps;
     const float now = std::max(0.02F, mean_level(*world, look(*world, small.color, this->at(t))));
     level = i == 0 ? now : level + 0.25F * (now - level);
     gains.push_back(std::clamp(0.68F / level, 0.35F, 3.0F));
   }
-}
 
-float SynthSource::Impl::gain(std::int64_t number) const {
-  const auto k = static_cast<std::size_t>(number / kGainStep);
   const float s = static_cast<float>(number % kGainStep) / static_cast<float>(kGainStep);
   return gains[k] + s * (gains[k + 1] - gains[k]);
 }
@@ -349,8 +348,15 @@ core::Result<std::unique_ptr<SynthSource>> SynthSource::create(std::shared_ptr<c
   impl->marks =
       LensMarks(impl->color_faults, {impl->camera.color.width, impl->camera.color.height}, impl->seed);
   impl->tiles = make_noise(impl->world->options.sensor, impl->seed);
-  impl->set_exposure();
   return std::unique_ptr<SynthSource>(new SynthSource(std::move(impl)));
+}
+
+core::Result<void> check_paths(const std::shared_ptr<const World>& world) {
+  for (int robot = 0; robot < recordings(world->options); ++robot) {
+    if (auto planned = SynthSource::plan(world, robot); !planned)
+      return tl::unexpected<core::Error>(planned.error());
+  }
+  return {};
 }
 
 core::Result<void> check_paths(const Scene& scene, const SynthOptions& options) {
@@ -358,12 +364,7 @@ core::Result<void> check_paths(const Scene& scene, const SynthOptions& options) 
   if (scene.faces.empty() || scene.robots.empty())
     return core::usage_error(
         fmt::format("scene '{}' has no surfaces or no robot; add `objects:` and `robots:`", scene.name));
-  const auto world = std::make_shared<const World>(scene, options);
-  for (int robot = 0; robot < recordings(options); ++robot) {
-    if (auto planned = SynthSource::plan(world, robot); !planned)
-      return tl::unexpected<core::Error>(planned.error());
-  }
-  return {};
+  return check_paths(std::make_shared<const World>(scene, options));
 }
 
 const std::string& SynthSource::name() const { return impl_->name; }

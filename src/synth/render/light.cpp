@@ -150,9 +150,8 @@ LightMap light_face(const World& world, std::size_t index) {
 
 }  // namespace
 
-void World::build_light(const core::Executor& executor) {
-  light.resize(scene.faces.size());
-  executor.parallel_for(scene.faces.size(), [&](std::size_t i) { light[i] = light_face(*this, i); });
+void World::prepare_light() {
+  light.prepare(scene.faces.size(), [this](std::size_t i) { return light_face(*this, i); });
 }
 
 }  // namespace plumbline::synth

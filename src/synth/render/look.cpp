@@ -12,7 +12,7 @@ using Eigen::Vector3d;
 
 TexelScale texel_scale(const World& world, std::size_t face) {
   const Face& f = world.scene.faces[face];
-  const Texture2d::Level& top = world.textures[static_cast<std::size_t>(world.texture_of[face])].levels[0];
+  const cv::Size& top = world.texture_sizes[static_cast<std::size_t>(world.texture_of[face])];
   const double tile = world.tile_m[face];
   const bool tiled =
       f.stretch_u <= 0.0 || (world.options.texture == Texture::kNone && world.materials[face]->large);
@@ -207,9 +207,10 @@ View look(const World& world, const sensor::Pinhole& camera, const geometry::Rig
   }
 
   for (const World::Mover& mover : world.movers) {
+    const geometry::Rigid3 motion = world.motion(mover, time.value_or(0.0));
     geometry::Rigid3 camera_from_rest = camera_from_world;
-    camera_from_rest.translation +=
-        camera_from_world.rotation * (mover.walker.at(time.value_or(0.0)) - mover.walker.from);
+    camera_from_rest.rotation = camera_from_world.rotation * motion.rotation;
+    camera_from_rest.translation += camera_from_world.rotation * motion.translation;
     for (std::size_t i = mover.first; i < mover.first + mover.count; ++i) {
       view.faces.push_back(view_face(world, i, camera, camera_from_rest));
     }

@@ -41,9 +41,11 @@ class MovingFaces {
  private:
   struct Spot {
     std::size_t face;
-    Eigen::Vector3d shift;  ///< from where the walk begins
-    cv::Rect reach;         ///< pixels
+    geometry::Rigid3 motion;  ///< from where the walk begins
+    cv::Rect reach;           ///< pixels
   };
+  /// The face of a spot if it is in front of `best` at a pixel, else `best`.
+  [[nodiscard]] int nearer(const View& view, const Spot& spot, int best, float x, float y) const;
   const World& world_;
   std::vector<Spot> spots_;
 };

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Walkers that move through a world while it is filmed.
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "render/path.hpp"
 #include "render/render.hpp"
 #include "scene/builder.hpp"
 
@@ -17,13 +19,97 @@ Vector3d Walker::at(double t) const {
   return from + share * (to - from);
 }
 
-void add_walker(Builder& b, const Walker& walker) {
-  const Vector3d way = walker.to - walker.from;
-  const geometry::Rigid3 frame = upright(walker.from, std::atan2(way.y(), way.x()));
+FigurePose Walker::pose(double t) const {
+  const double at = std::fmod(std::max(t, 0.0) / kFigureStep, static_cast<double>(day.size() - 1));
+  const auto i = static_cast<std::size_t>(at);
+  const double s = at - std::floor(at);
+  const FigurePose &a = day[i], &b = day[i + 1];
+  FigurePose out;
+  out.hip = a.hip + s * (b.hip - a.hip);
+  out.yaw = a.yaw + s * wrap(b.yaw - a.yaw);
+  for (const int k : {0, 1}) out.foot[k] = a.foot[k] + s * (b.foot[k] - a.foot[k]);
+  return out;
+}
+
+namespace {
+
+enum Part { kTrunk, kThigh, kShin = kThigh + 2, kArm = kShin + 2, kParts = kArm + 2 };  // left, then right
+constexpr double kLimb = 0.45;  // m from hip to knee and from knee to sole
+
+/// Frames of a person's parts: origin at the upper joint, x forward, z up.
+std::array<geometry::Rigid3, kParts> part_frames(const FigurePose& pose, bool carries) {
+  const auto turn = [](const Vector3d& axis, double angle) {
+    return Eigen::AngleAxisd(angle, axis).toRotationMatrix();
+  };
+
+  std::array<geometry::Rigid3, kParts> out;
+  const geometry::Rigid3 trunk = upright(pose.hip, pose.yaw);
+  out[kTrunk] = trunk;
+  double ahead[2];
+  for (const int side : {0, 1}) {
+    const double y = side == 0 ? 1.0 : -1.0;
+    const Vector3d joint(0.0, 0.09 * y, 0.0);
+    const Vector3d foot = trunk.inverse() * pose.foot[side] - joint;
+    ahead[side] = foot.x();
+
+    // Both bones lie in the plane of hip, foot and the way ahead; the knee bends forwards.
+    const double down = std::hypot(foot.y(), foot.z());
+    const double reach = std::min(std::hypot(foot.x(), down), 1.999 * kLimb);
+    const double middle = std::atan2(foot.x(), down), bend = std::acos(0.5 * reach / kLimb);
+    const Eigen::Matrix3d roll = turn(Vector3d::UnitX(), std::atan2(foot.y(), -foot.z()));
+    const geometry::Rigid3 thigh(Eigen::Matrix3d(roll * turn(Vector3d::UnitY(), -middle - bend)), joint);
+    const geometry::Rigid3 shin(Eigen::Matrix3d(roll * turn(Vector3d::UnitY(), bend - middle)),
+                                thigh * Vector3d(0.0, 0.0, -kLimb));
+    out[static_cast<std::size_t>(kThigh + side)] = trunk * thigh;
+    out[static_cast<std::size_t>(kShin + side)] = trunk * shin;
+  }
+
+  // Each arm swings like the other side's leg.
+  for (const int side : {0, 1}) {
+    const double y = side == 0 ? 1.0 : -1.0,
+                 swing = carries ? 1.1 : 1.1 * std::clamp(ahead[1 - side], -0.4, 0.4);
+    out[static_cast<std::size_t>(kArm + side)] =
+        trunk * geometry::Rigid3(turn(Vector3d::UnitY(), -swing), Vector3d(0.0, 0.25 * y, 0.5));
+  }
+  return out;
+}
+
+}  // namespace
+
+int walker_parts(const Walker& walker) { return walker.day.empty() ? 1 : kParts; }
+
+geometry::Rigid3 walker_motion(const Walker& walker, int part, double t) {
+  if (walker.day.empty()) return {Eigen::Matrix3d::Identity(), walker.at(t) - walker.from};
+  const auto k = static_cast<std::size_t>(part);
+  return part_frames(walker.pose(t), walker.carries)[k] *
+         part_frames(walker.day.front(), walker.carries)[k].inverse();
+}
+
+void add_walker(Builder& b, const Walker& walker, int part) {
   b.begin_object("walker", "", walker.mark);
-  const Skin clothes{walker.material};
-  b.box(frame, {-0.15, -0.25, 0.0}, {0.15, 0.25, 1.42}, clothes);
-  b.box(frame, {-0.1, -0.09, 1.42}, {0.12, 0.09, 1.7}, Skin{"terracotta"});
+  const Skin clothes{walker.material}, skin{"terracotta"}, trousers{"fabric"};
+  if (walker.day.empty()) {
+    const Vector3d way = walker.to - walker.from;
+    const geometry::Rigid3 frame = upright(walker.from, std::atan2(way.y(), way.x()));
+    b.box(frame, {-0.15, -0.25, 0.0}, {0.15, 0.25, 1.42}, clothes);
+    b.box(frame, {-0.1, -0.09, 1.42}, {0.12, 0.09, 1.7}, skin);
+    return;
+  }
+
+  const geometry::Rigid3 frame =
+      part_frames(walker.day.front(), walker.carries)[static_cast<std::size_t>(part)];
+  if (part == kTrunk) {
+    b.box(frame, {-0.11, -0.2, -0.08}, {0.11, 0.2, 0.56}, clothes);
+    b.box(frame, {-0.1, -0.08, 0.58}, {0.11, 0.08, 0.86}, skin);
+    if (walker.carries) b.box(frame, {0.3, -0.2, 0.08}, {0.6, 0.2, 0.34}, {"cardboard"});
+  } else if (part < kShin) {
+    b.box(frame, {-0.08, -0.075, -kLimb - 0.03}, {0.08, 0.075, 0.05}, trousers);
+  } else if (part < kArm) {
+    b.box(frame, {-0.06, -0.06, -kLimb + 0.08}, {0.06, 0.06, 0.0}, trousers);
+    b.box(frame, {-0.08, -0.055, -kLimb}, {0.17, 0.055, -kLimb + 0.08}, {"plastic_black"});
+  } else {
+    b.box(frame, {-0.05, -0.045, -0.6}, {0.05, 0.045, 0.03}, clothes);
+  }
 }
 
 namespace {
@@ -36,20 +122,23 @@ float inverse_depth(const View& view, int face, float x, float y) {
 
 }  // namespace
 
+int MovingFaces::nearer(const View& view, const Spot& spot, int best, float x, float y) const {
+  const float here = inverse_depth(view, static_cast<int>(spot.face), x, y);
+  if (here <= inverse_depth(view, best, x, y)) return best;
+  const Vector3d ray = view.world_from_camera.rotation * view.camera.unproject(x, y, 1.0);
+  const Face& face = world_.scene.faces[spot.face];
+  const Vector3d d =
+      spot.motion.rotation.transpose() *
+          (view.world_from_camera.translation + ray / static_cast<double>(here) - spot.motion.translation) -
+      face.origin;
+  return face.contains({d.dot(face.u_axis), d.dot(face.v_axis)}) ? static_cast<int>(spot.face) : best;
+}
+
 int MovingFaces::in_front(const View& view, int fixed, float x, float y) const {
   int best = fixed;
-  float nearest = inverse_depth(view, fixed, x, y);
-  const Vector3d ray = view.world_from_camera.rotation * view.camera.unproject(x, y, 1.0);
   for (const Spot& spot : spots_) {
-    if (!spot.reach.contains({static_cast<int>(x), static_cast<int>(y)})) continue;
-    const float here = inverse_depth(view, static_cast<int>(spot.face), x, y);
-    if (here <= nearest) continue;
-    const Face& face = world_.scene.faces[spot.face];
-    const Vector3d d =
-        view.world_from_camera.translation + ray / static_cast<double>(here) - spot.shift - face.origin;
-    if (!face.contains({d.dot(face.u_axis), d.dot(face.v_axis)})) continue;
-    best = static_cast<int>(spot.face);
-    nearest = here;
+    if (spot.reach.contains({static_cast<int>(x), static_cast<int>(y)}))
+      best = nearer(view, spot, best, x, y);
   }
   return best;
 }
@@ -57,39 +146,43 @@ int MovingFaces::in_front(const View& view, int fixed, float x, float y) const {
 MovingFaces::MovingFaces(const World& world, const View& view, double t) : world_(world) {
   const geometry::Rigid3 camera_from_world = view.world_from_camera.inverse();
   for (const World::Mover& mover : world.movers) {
-    const Vector3d shift = mover.walker.at(t) - mover.walker.from;
+    const geometry::Rigid3 motion = world.motion(mover, t);
+    const Vector3d eye =
+        motion.rotation.transpose() * (view.world_from_camera.translation - motion.translation);
     for (std::size_t i = mover.first; i < mover.first + mover.count; ++i) {
       const Face& face = world.scene.faces[i];
-      if (face.normal.dot(view.world_from_camera.translation - shift - face.origin) <= 0.0) continue;
+      if (face.normal.dot(eye - face.origin) <= 0.0) continue;
 
-      cv::Rect reach({0, 0}, view.ids.size());
-      std::vector<cv::Point> pixels;
-      for (const Eigen::Vector2d& uv : face.polygon) {
-        const Vector3d p = camera_from_world * (face.at(uv.x(), uv.y()) + shift);
-        if (p.z() < 0.05) break;
+      // The pixels about the part of it that is before the camera.
+      constexpr double kNear = 0.05;
+      cv::Rect box;
+      const auto add = [&](const Vector3d& p) {
         const Eigen::Vector2d pixel = view.camera.project(p);
-        pixels.emplace_back(static_cast<int>(std::clamp(pixel.x(), -1e6, 1e6)),
-                            static_cast<int>(std::clamp(pixel.y(), -1e6, 1e6)));
+        box |= cv::Rect(static_cast<int>(std::clamp(pixel.x(), -1e6, 1e6)) - 2,
+                        static_cast<int>(std::clamp(pixel.y(), -1e6, 1e6)) - 2, 5, 5);
+      };
+      Vector3d before =
+          camera_from_world * (motion * face.at(face.polygon.back().x(), face.polygon.back().y()));
+      for (const Eigen::Vector2d& uv : face.polygon) {
+        const Vector3d p = camera_from_world * (motion * face.at(uv.x(), uv.y()));
+        if ((p.z() < kNear) != (before.z() < kNear))
+          add(before + (kNear - before.z()) / (p.z() - before.z()) * (p - before));
+        if (p.z() >= kNear) add(p);
+        before = p;
       }
 
-      if (pixels.size() == face.polygon.size()) {  // else part of it is behind the camera: look everywhere
-        cv::Rect box(pixels[0], cv::Size(1, 1));
-        for (const cv::Point& p : pixels) box |= cv::Rect(p, cv::Size(1, 1));
-        reach &= cv::Rect(box.x - 2, box.y - 2, box.width + 4, box.height + 4);
-      }
-
-      if (!reach.empty()) spots_.push_back({i, shift, reach});
+      const cv::Rect reach = box & cv::Rect({0, 0}, view.ids.size());
+      if (!reach.empty()) spots_.push_back({i, motion, reach});
     }
   }
 }
 
 void MovingFaces::draw(View& view) const {
-  cv::Rect reach;
-  for (const Spot& spot : spots_) reach |= spot.reach;
-  for (int y = reach.y; y < reach.y + reach.height; ++y) {
-    int* row = view.ids[y];
-    for (int x = reach.x; x < reach.x + reach.width; ++x) {
-      row[x] = in_front(view, row[x], static_cast<float>(x), static_cast<float>(y));
+  for (const Spot& spot : spots_) {
+    for (int y = spot.reach.y; y < spot.reach.y + spot.reach.height; ++y) {
+      int* row = view.ids[y];
+      for (int x = spot.reach.x; x < spot.reach.x + spot.reach.width; ++x)
+        row[x] = nearer(view, spot, row[x], static_cast<float>(x), static_cast<float>(y));
     }
   }
 }

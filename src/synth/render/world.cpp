@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <tuple>
 
+#include "plumbline/synth/layout.hpp"
 #include "scene/builder.hpp"
 #include "scene/random.hpp"
 
@@ -24,10 +25,12 @@ World::World(Scene s, SynthOptions o) : scene(std::move(s)), options(std::move(o
   fixed_faces = scene.faces.size();
   const std::size_t walkers = std::min(scene.walkers.size(), static_cast<std::size_t>(options.walkers));
   for (std::size_t i = 0; i < walkers; ++i) {
-    const std::size_t first = scene.faces.size();
-    Builder builder(scene);
-    add_walker(builder, scene.walkers[i]);
-    movers.push_back({scene.walkers[i], first, scene.faces.size() - first});
+    for (int part = 0; part < walker_parts(scene.walkers[i]); ++part) {
+      const std::size_t first = scene.faces.size();
+      Builder builder(scene);
+      add_walker(builder, scene.walkers[i], part);
+      movers.push_back({i, part, first, scene.faces.size() - first});
+    }
   }
   for (const Face& face : scene.faces) materials.push_back(find_material(face.material));
   build_bvh();
@@ -153,7 +156,7 @@ void World::cast_packet(const float origin[3], const float* dx, const float* dy,
   }
 }
 
-void World::build_textures(const core::Executor& executor) {
+void World::prepare_textures() {
   // Faces of one material share a texture when it tiles; a print that is stretched is drawn for its seed and
   // shape.
   struct Job {
@@ -193,14 +196,15 @@ void World::build_textures(const core::Executor& executor) {
     }
   }
 
-  textures.resize(jobs.size());
-  executor.parallel_for(jobs.size(), [&](std::size_t k) {
-    textures[k] = draw_texture(*jobs[k].material, options.texture, jobs[k].seed, jobs[k].aspect);
+  for (const Job& job : jobs)
+    texture_sizes.push_back(texture_size(*job.material, options.texture, job.aspect));
+  textures.prepare(jobs.size(), [jobs, texture = options.texture](std::size_t k) {
+    return draw_texture(*jobs[k].material, texture, jobs[k].seed, jobs[k].aspect);
   });
 }
 
 core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const SynthOptions& options,
-                                                       const core::Executor& executor) {
+                                                       const core::Executor&) {
   if (auto ok = check(options); !ok) return tl::unexpected<core::Error>(ok.error());
   if (scene.faces.empty())
     return core::usage_error(fmt::format("scene '{}' has no surfaces; add `objects:`", scene.name));
@@ -213,17 +217,17 @@ core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const
     }
   }
 
-  if (static_cast<std::size_t>(options.walkers) > scene.walkers.size()) {
+  Scene peopled = scene;
+  if (!add_people(options.walkers, options.seed, peopled)) {
     return core::usage_error(
-        fmt::format("walkers: scene '{}' has {}, not {}; ask for fewer, or add some to a copy of the scene",
+        fmt::format("walkers: scene '{}' has {}, not {}, and no free floor near its first path for more; ask "
+                    "for fewer, or add some to a copy of the scene",
                     scene.name, scene.walkers.size(), options.walkers));
   }
-
-  // Cheap checks come before the second or two of drawing.
-  if (auto free = check_paths(scene, options); !free) return tl::unexpected<core::Error>(free.error());
-  auto world = std::make_shared<World>(scene, options);
-  world->build_textures(executor);
-  world->build_light(executor);
+  auto world = std::make_shared<World>(std::move(peopled), options);
+  if (auto free = check_paths(world); !free) return tl::unexpected<core::Error>(free.error());
+  world->prepare_textures();
+  world->prepare_light();
   return std::shared_ptr<const World>(world);
 }
 

@@ -8,6 +8,8 @@
 #include "plumbline/core/executor.hpp"
 #include "plumbline/synth/scene.hpp"
 #include "plumbline/synth/source.hpp"
+#include "render/on_demand.hpp"
+#include "scene/builder.hpp"
 
 struct RTCDeviceTy;
 struct RTCSceneTy;
@@ -54,7 +56,8 @@ class World {
 
   /// Faces [first, first + count) of the scene walk: they are where the walk begins and move with the time.
   struct Mover {
-    Walker walker;
+    std::size_t walker = 0;  ///< index into Scene::walkers
+    int part = 0;
     std::size_t first = 0;
     std::size_t count = 0;
   };
@@ -65,15 +68,16 @@ class World {
   std::vector<Mover> movers;
   std::vector<Event> events;               ///< of scene and options
   std::vector<const Material*> materials;  ///< per face
-  std::vector<LightMap> light;             ///< per face
-  std::vector<Texture2d> textures;
-  std::vector<int> texture_of;  ///< per face
-  std::vector<double> tile_m;   ///< per face: metres one copy of a tiled texture covers
-  std::vector<float> offset_u;  ///< per face: shift of tiled textures, metres
+  OnDemand<LightMap> light;                ///< per face
+  OnDemand<Texture2d> textures;
+  std::vector<cv::Size> texture_sizes;  ///< px, of level 0
+  std::vector<int> texture_of;          ///< per face
+  std::vector<double> tile_m;           ///< per face: metres one copy of a tiled texture covers
+  std::vector<float> offset_u;          ///< per face: shift of tiled textures, metres
   std::vector<float> offset_v;
 
-  void build_textures(const core::Executor& executor);
-  void build_light(const core::Executor& executor);
+  void prepare_textures();
+  void prepare_light();
 
   /// First thing along a ray; direction need not be unit (distance is in its lengths).
   [[nodiscard]] Hit cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double far) const;
@@ -85,6 +89,9 @@ class World {
   /// kPacket rays from one origin; faces[k] = -1 for nothing. dx, dy, dz: directions.
   void cast_packet(const float origin[3], const float* dx, const float* dy, const float* dz,
                    int* faces) const;
+  [[nodiscard]] geometry::Rigid3 motion(const Mover& mover, double t) const {
+    return walker_motion(scene.walkers[mover.walker], mover.part, t);
+  }
   /// True if a point lies inside a solid.
   [[nodiscard]] bool inside_solid(const Eigen::Vector3d& point) const;
 

@@ -78,7 +78,14 @@ void add_panel(Builder& b, const geometry::Rigid3& frame, double width, double h
 
 // ---- walker.cpp ----
 
-void add_walker(Builder& b, const Walker& walker);
+constexpr double kFigureStep = 0.04;  ///< s between the poses of a person's day
+constexpr double kHipHeight = 0.84;   ///< m above the soles, standing
+
+/// Parts of a walker that move on their own: 1, or 7 of a person.
+int walker_parts(const Walker& walker);
+void add_walker(Builder& b, const Walker& walker, int part);
+/// Motion of a part from where it is built to where it is t seconds after the first frame.
+geometry::Rigid3 walker_motion(const Walker& walker, int part, double t);
 
 // ---- walls.cpp ----
 

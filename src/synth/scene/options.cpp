@@ -16,8 +16,17 @@ namespace plumbline::synth {
 void SynthOptions::declare(core::OptionTable& table) {
   table.integer("frames", frames, {-1, 1000000}, "", "Frames of each robot; -1 = the path once");
   table.integer("robots", robots, {1, 64}, "", "Number of recordings");
-  table.integer("layout", layout, {-1, 2147483647}, "",
-                "Number from which a home, office or corridor is made; -1 = the scene as its file says");
+  table.integer(
+      "layout", layout, {-1, 2147483647}, "",
+      "Number from which a home, office, corridor or building is made; -1 = the scene as its file says");
+
+  table.integer("floors", floors, {1, 8}, "", "Storeys of a building that is made from a number");
+  table.integer("rooms", rooms, {4, 60}, "", "Rooms of each of its storeys");
+  table.integer(
+      "like", like, {0, 12}, "",
+      "Rooms alike in an office or on each storey of a building: the same walls and furniture, their "
+      "own posters");
+  table.integer("copies", copies, {0, 12}, "", "The same with the same posters");
 
   table.choice(
       "path", path,
@@ -29,8 +38,12 @@ void SynthOptions::declare(core::OptionTable& table) {
       "Path through a world made from a number: all rooms, a loop through some, random places, or to "
       "the other end and back; scene: as the scene file says, else a tour");
 
-  table.integer("walkers", walkers, {0, 16}, "",
-                "Number of walkers in the scene: filmed, but no part of reference.ply");
+  table.text(
+      "changes", changes,
+      "The same world another day: a seed, or a YAML file of edits; what has changed is in changes.json");
+
+  table.integer("walkers", walkers, {0, 20}, "",
+                "Number of people who walk about: filmed, but no part of reference.ply");
 
   table.choice("texture", texture,
                {{"full", Texture::kFull}, {"weak", Texture::kWeak}, {"none", Texture::kNone}},

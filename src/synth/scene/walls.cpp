@@ -66,9 +66,11 @@ void add_leaf(Builder& b, const Rigid3& frame, const Wall& wall, const Opening& 
       placed(frame, {o.at + 0.01, -0.5 * wall.thickness, o.bottom}, {-o.open_rad, Vector3d::UnitZ()});
   const double w = o.width - 0.02, h = o.height - 0.02;
   const Skin leaf{o.material, true};
+  const std::size_t first = b.scene().faces.size();
   b.box(hinge, {0.0, 0.0, 0.01}, {w, 0.04, h}, leaf, &leaf);
   for (const double y : {-0.05, 0.04})
     b.box(hinge, {w - 0.14, y, 1.02}, {w - 0.03, y + 0.05, 1.05}, {"metal"});
+  b.scene().leaves.push_back({first, b.scene().faces.size() - first, hinge.translation, o.open_rad});
 }
 
 void add_wall(Builder& b, const Wall& wall) {

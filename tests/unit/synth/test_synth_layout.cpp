@@ -7,6 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
+#include <set>
 
 #include "plumbline/core/log.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
@@ -24,6 +25,8 @@ core::Result<Scene> make(const std::string& kind, int number, int robots, Route 
   options.layout = number;
   options.robots = robots;
   options.path = path;
+  options.floors = 2;
+  options.rooms = 6;
   return make_layout(kind, options);
 }
 
@@ -39,9 +42,14 @@ bool cross_each_other(const PlanFace& f, const PlanFace& g) {
 /// Area of the faces of one object of a type that belong to room `index`, by the name that its floor has.
 double floor_area(const Scene& scene, std::size_t index) {
   double area = 0.0;
-  const std::string name = "floor of " + scene.plan->rooms[index].kind + " " + std::to_string(index);
+  std::size_t number = index;  // within its storey
+  while (number > 0 && scene.plan->rooms[index - number].storey != scene.plan->rooms[index].storey) --number;
+  const std::string name = "floor of " + scene.plan->rooms[index].kind + " " + std::to_string(number);
+  const double floor = scene.plan->storeys[static_cast<std::size_t>(scene.plan->rooms[index].storey)];
   for (const Face& face : scene.faces) {
-    if (scene.objects[static_cast<std::size_t>(face.object)].name == name) area += signed_area(face.polygon);
+    if (scene.objects[static_cast<std::size_t>(face.object)].name == name &&
+        std::abs(face.origin.z() - floor) < 1e-9)
+      area += signed_area(face.polygon);
   }
   return area;
 }
@@ -61,8 +69,11 @@ void check_rooms(const Scene& scene) {
                   1e-9);
     }
 
-    EXPECT_NEAR(room.area(), floor_area(scene, r), 1e-9) << scene.name << " room " << r;
-    if (room.kind == "corridor" || room.kind == "hall") continue;
+    const bool stairs = room.kind == "stairs";
+    if (!stairs) {
+      EXPECT_NEAR(room.area(), floor_area(scene, r), 1e-9) << scene.name << " room " << r;
+    }
+    if (stairs || room.kind == "corridor" || room.kind == "hall") continue;
     EXPECT_GE(room.area(), 4.0) << scene.name << " room " << r;
     EXPECT_LE(room.area(), 60.0) << scene.name << " room " << r;
   }
@@ -112,13 +123,23 @@ void check_ways(const Scene& scene) {
       char &a = reached[static_cast<std::size_t>(o.front)], &b = reached[static_cast<std::size_t>(o.back)];
       a = b = static_cast<char>(a | b);
     }
+    bool climbed = false;
+    for (std::size_t r = 0; r < plan.rooms.size(); ++r)
+      climbed = climbed || (plan.rooms[r].kind == "stairs" && reached[r] != 0);
+    for (std::size_t r = 0; r < plan.rooms.size(); ++r) {
+      if (plan.rooms[r].kind == "stairs" && climbed) reached[r] = 1;
+    }
   }
   EXPECT_EQ(std::count(reached.begin(), reached.end(), 1), static_cast<long>(reached.size())) << scene.name;
 
   for (const PlanRoom& room : plan.rooms) {
     const auto& waypoints = scene.robots[0].waypoints;
     EXPECT_TRUE(std::any_of(waypoints.begin(), waypoints.end(),
-                            [&](const Waypoint& w) { return room.contains(w.position.head<2>()); }))
+                            [&](const Waypoint& w) {
+                              const double up =
+                                  w.position.z() - plan.storeys[static_cast<std::size_t>(room.storey)];
+                              return up > 1.0 && up < 2.0 && room.contains(w.position.head<2>());
+                            }))
         << scene.name << ": " << room.kind;
   }
   const auto free = check_paths(scene, {});
@@ -132,6 +153,10 @@ void check_things(const Scene& scene) {
     for (const Vector2d& p : thing.outline)
       EXPECT_TRUE(scene.plan->rooms[static_cast<std::size_t>(thing.room)].contains(p)) << scene.name;
     for (const PlanThing& other : scene.plan->things) {
+      const auto storey = [&](const PlanThing& t) {
+        return scene.plan->rooms[static_cast<std::size_t>(t.room)].storey;
+      };
+      if (storey(other) != storey(thing)) continue;
       Vector2d middle = Vector2d::Zero();
       for (const Vector2d& p : other.outline) middle += 0.25 * p;
       PlanRoom inside;
@@ -195,7 +220,7 @@ TEST_P(SynthLayout, EveryPathIsFreeAndOfItsKind) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, SynthLayout, testing::Values("home", "office", "corridor"));
+INSTANTIATE_TEST_SUITE_P(Kinds, SynthLayout, testing::Values("home", "office", "corridor", "building"));
 
 TEST(SynthLayoutNumbers, WorldsDiffer) {
   int tilted = 0, walls = 0, many_corners = 0;
@@ -268,12 +293,58 @@ TEST(SynthLayoutNumbers, PlanFileHasTheTruth) {
   }
 }
 
+/// Things of like rooms by type and place in the room; with posters, the seeds of their prints.
+std::multiset<std::string> contents(const Scene& scene, int room, bool prints) {
+  const PlanRoom& r = scene.plan->rooms[static_cast<std::size_t>(room)];
+  std::multiset<std::string> out;
+  for (const Face& face : scene.faces) {
+    const std::string& type = scene.objects[static_cast<std::size_t>(face.object)].type;
+    const Eigen::AlignedBox2d b = face.bounds();
+    const Eigen::Vector3d p = face.at(b.center().x(), b.center().y()) + 0.001 * face.normal;
+    const double up = p.z() - scene.plan->storeys[static_cast<std::size_t>(r.storey)];
+    if (!r.contains(p.head<2>()) || up < -0.01 || up > r.height || (prints && face.stretch_u == 0.0))
+      continue;
+    const Vector2d d = p.head<2>() - r.faces[0].from;
+    char text[120];
+    std::snprintf(text, sizeof text, "%s %.3f %.3f %.3f %d", type.c_str(), d.x() + 1e-6, d.y() + 1e-6,
+                  up + 1e-6, prints ? face.seed : 0);
+    out.insert(text);
+  }
+  return out;
+}
+
+TEST(SynthLayoutNumbers, LikeRoomsDifferInPostersOnlyAndCopiesInNothing) {
+  for (const char* kind : {"office", "building"}) {
+    for (const bool copies : {false, true}) {
+      SynthOptions options;
+      options.layout = 2;
+      options.floors = 2;
+      (copies ? options.copies : options.like) = 4;
+      const auto scene = make_layout(kind, options);
+      ASSERT_TRUE(scene) << scene.error().message;
+      check_rooms(*scene);
+      check_openings(*scene);
+      check_ways(*scene);
+      check_things(*scene);
+      const std::vector<int>& alike = scene->plan->alike;
+      ASSERT_EQ(alike.size(), kind == std::string("office") ? 4U : 8U);
+      const auto first = contents(*scene, alike[0], false), prints = contents(*scene, alike[0], true);
+      EXPECT_GT(first.size(), 30U);
+      for (int i = 1; i < 4; ++i) {
+        EXPECT_EQ(contents(*scene, alike[static_cast<std::size_t>(i)], false), first) << kind;
+        EXPECT_EQ(contents(*scene, alike[static_cast<std::size_t>(i)], true) == prints, copies) << kind;
+      }
+    }
+  }
+}
+
 TEST(SynthLayoutNumbers, SceneWithoutLayoutsIsRefused) {
   SynthOptions options;
   options.layout = 3;
   const auto none = open_scene("room", options, std::string(PLUMBLINE_SOURCE_DIR) + "/pipelines/scenes");
   ASSERT_FALSE(none);
-  EXPECT_NE(none.error().message.find("home, office, corridor"), std::string::npos) << none.error().message;
+  EXPECT_NE(none.error().message.find("home, office, corridor, building"), std::string::npos)
+      << none.error().message;
   SynthOptions laps;
   laps.path = Route::kLaps;
   EXPECT_FALSE(open_scene("room", laps, std::string(PLUMBLINE_SOURCE_DIR) + "/pipelines/scenes"));

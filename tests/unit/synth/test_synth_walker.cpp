@@ -5,7 +5,9 @@
 #include <filesystem>
 #include <fstream>
 #include <sstream>
+#include <stdexcept>
 
+#include "plumbline/synth/layout.hpp"
 #include "plumbline/synth/recording.hpp"
 #include "plumbline/synth/source.hpp"
 
@@ -117,8 +119,70 @@ TEST(Walker, IsNoPartOfTheReference) {
   EXPECT_EQ(references[0], references[1]);
 }
 
-TEST(Walker, MoreThanThereAreAndWrongOnesAreRefused) {
-  const auto many = walked_world(kWalkedCell, small(2, 3));
+/// Feet stay where they are unless they are lifted, and bones have their lengths.
+TEST(Walker, PeopleStepWithoutSliding) {
+  SynthOptions home;
+  home.layout = 5;
+  auto scene = make_layout("home", home);
+  ASSERT_TRUE(scene);
+  ASSERT_TRUE(scene->walkers.empty());
+  ASSERT_TRUE(add_people(12, 1, *scene));
+  ASSERT_EQ(scene->walkers.size(), 12U);
+  int sitting = 0;
+  double walked = 0.0;
+  for (const Walker& person : scene->walkers) {
+    ASSERT_GT(person.day.size(), 200U);
+    EXPECT_LT((person.day.back().hip - person.day.front().hip).norm(), 1e-9);
+    bool sits = false;
+    for (std::size_t i = 1; i < person.day.size(); ++i) {
+      const FigurePose &before = person.day[i - 1], &now = person.day[i];
+      const double pace = (now.hip - before.hip).head<2>().norm() / 0.04;
+      EXPECT_LT(pace, 1.3);
+      walked += 0.04 * pace;
+      sits = sits || now.hip.z() < 0.55;
+      for (const int side : {0, 1}) {
+        const bool down = before.foot[side].z() < 1e-9 && now.foot[side].z() < 1e-9;
+        EXPECT_LT(down ? (now.foot[side] - before.foot[side]).norm() : 0.0, 0.012) << i;
+        EXPECT_LT((now.foot[side] - now.hip).norm(), 0.96);
+      }
+      EXPECT_LT(std::min(now.foot[0].z(), now.foot[1].z()), 0.02) << i;
+    }
+    sitting += sits ? 1 : 0;
+  }
+  EXPECT_GT(sitting, 0);
+  EXPECT_GT(walked, 100.0);
+}
+
+/// The largest share of a picture that people take, over the whole path.
+double largest_crowd(const Scene& scene, const SynthOptions& options) {
+  const auto world = build_world(scene, options, core::Executor(2));
+  if (!world) throw std::runtime_error(world.error().message);
+  const auto source = SynthSource::create(*world, 0);
+  if (!source) throw std::runtime_error(source.error().message);
+  double most = 0.0;
+  for (std::size_t i = 0; i < (*source)->size(); ++i) {
+    const cv::Mat1i faces = (*source)->exact(i).face;
+    most = std::max(most, cv::countNonZero(faces >= static_cast<int>(scene.faces.size())) /
+                              static_cast<double>(faces.total()));
+  }
+  return most;
+}
+
+TEST(Walker, ACrowdTakesMostOfThePicture) {
+  SynthOptions options = small(12, -1);
+  options.width = 64;
+  options.height = 48;
+  options.fps = 2.0;
+  options.layout = 5;
+  const auto scene = make_layout("home", options);
+  ASSERT_TRUE(scene);
+  EXPECT_GT(largest_crowd(*scene, options), 0.6);
+}
+
+TEST(Walker, MoreThanTheFloorHasRoomForAndWrongOnesAreRefused) {
+  std::string narrow(kWalkedCell);
+  narrow.replace(narrow.find("[2, 2.1], material"), 8, "[2, -2.6]");
+  const auto many = walked_world(narrow, small(2, 3));
   ASSERT_FALSE(many);
   EXPECT_NE(many.error().message.find("has 1, not 2"), std::string::npos) << many.error().message;
   const std::string start(kWalkedCell);

@@ -1,0 +1,298 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Storeys above each other, and the stairs between them.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "layout/layout.hpp"
+
+namespace plumbline::synth {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+namespace {
+
+constexpr double kGoing = 0.27;    // m from step to step
+constexpr double kRise = 0.18;     // m, the largest height of a step
+constexpr double kEntry = 1.3;     // m of floor before the stairs, on every storey
+constexpr double kLanding = 1.25;  // m, the least depth of the landing halfway
+constexpr double kSlab = 0.3;      // m of concrete between storeys
+
+int steps_of(double pitch) { return static_cast<int>(std::ceil(0.5 * pitch / kRise)); }
+
+/// The stairwell of all storeys: two flights side by side, with a landing halfway.
+struct Stairwell {
+  double x0, x1, y0, y1;  // m: inner faces; the corridor is beyond y1
+  double pitch;
+
+  explicit Stairwell(const PlanRoom& room, double pitch_m) : pitch(pitch_m) {
+    Eigen::AlignedBox2d box;
+    for (const Vector2d& p : room.outline()) box.extend(p);
+    x0 = box.min().x(), x1 = box.max().x(), y0 = box.min().y(), y1 = box.max().y();
+  }
+
+  [[nodiscard]] double middle() const { return 0.5 * (x0 + x1); }
+  [[nodiscard]] double top() const { return y1 - kEntry; }  // where the flights begin and end
+  [[nodiscard]] double bottom() const { return top() - steps_of(pitch) * kGoing; }
+  [[nodiscard]] Vector2d entry() const { return {middle(), y1 - 0.5 * kEntry}; }
+
+  /// The way from the entry up to that of the next storey; z above this floor.
+  [[nodiscard]] std::vector<Vector3d> climb() const {
+    const double left = 0.5 * (x0 + middle()), right = 0.5 * (x1 + middle());
+    std::vector<Vector3d> out = {{0.5 * (left + middle()), y1 - 0.5 * kEntry, 0.0}};
+    constexpr int kPieces = 6;
+    for (int i = 0; i <= kPieces; ++i) {
+      const double s = static_cast<double>(i) / kPieces;
+      out.emplace_back(left, top() + s * (bottom() - top()), 0.5 * s * pitch);
+    }
+    out.emplace_back(left + 0.2, bottom() - 0.5, 0.5 * pitch);
+    out.emplace_back(right - 0.2, bottom() - 0.5, 0.5 * pitch);
+    for (int i = 0; i <= kPieces; ++i) {
+      const double s = static_cast<double>(i) / kPieces;
+      out.emplace_back(right, bottom() + s * (top() - bottom()), 0.5 * (1.0 + s) * pitch);
+    }
+    out.emplace_back(0.5 * (right + middle()), y1 - 0.5 * kEntry, pitch);
+    return out;
+  }
+};
+
+/// Steps, landings, rails and lamps of one storey, whose floor is at 0.
+void build_stairs(const Stairwell& well, int index, bool lowest, bool highest, double height, Builder& b) {
+  const geometry::Rigid3 here;
+  const core::ConfigMark mark = b.scene().objects.front().mark;
+  const double m = well.middle(), pitch = well.pitch;
+  const auto solid = [&](const Vector3d& lo, const Vector3d& hi, const char* material) {
+    b.box(here, lo, hi, {material});
+  };
+
+  b.begin_object("floor", fmt::format("floor of stairs {}", index), mark);
+  if (lowest) {
+    b.polygon(
+        {{well.x0, well.y0, 0.0}, {well.x1, well.y0, 0.0}, {well.x1, well.y1, 0.0}, {well.x0, well.y1, 0.0}},
+        Vector3d::UnitX(), {"tiles"});
+  } else {
+    solid({well.x0, well.top(), -kSlab}, {well.x1, well.y1, 0.0}, "tiles");
+  }
+
+  b.begin_object("lamp", "", mark);
+  const double ceiling = highest ? height : pitch - kSlab;
+  add_ceiling_lamp(b, upright({m, well.y1 - 0.5 * kEntry, ceiling}, 0.0), 0.5, 0.5, 9.0);
+  b.begin_object("stairs", "", mark);
+  if (highest) {
+    b.polygon({{well.x0, well.y1, height},
+               {well.x1, well.y1, height},
+               {well.x1, well.y0, height},
+               {well.x0, well.y0, height}},
+              Vector3d::UnitX(), {"ceiling"});
+    if (lowest) return;
+    solid({well.x0, well.top() - 0.05, 0.0}, {m - 0.05, well.top(), 1.0}, "paint_grey");
+    solid({m - 0.05, well.bottom(), 0.0}, {m + 0.05, well.top(), 1.0}, "paint_grey");
+    return;
+  }
+
+  solid({m - 0.05, well.bottom(), 0.0}, {m + 0.05, well.top(), pitch}, "plaster");
+  solid({well.x0, well.y0, 0.5 * pitch - 0.25}, {well.x1, well.bottom(), 0.5 * pitch}, "tiles");
+  const int n = steps_of(pitch);
+  for (int i = 0; i < n; ++i) {
+    const double z = 0.5 * pitch * (i + 1) / n, a = well.top() - i * kGoing, c = well.bottom() + i * kGoing;
+    solid({well.x0, a - kGoing, std::max(0.0, z - 0.25)}, {m - 0.05, a, z}, "lino");
+    solid({m + 0.05, c, 0.5 * pitch + z - 0.25}, {well.x1, c + kGoing, 0.5 * pitch + z}, "lino");
+  }
+}
+
+BuildingFrame draw_frame(const SynthOptions& options, Rng& rng) {
+  BuildingFrame frame;
+  frame.height = rng.uniform(2.5, 3.2);
+  frame.pitch = frame.height + kSlab;
+  frame.outer = rng.uniform(0.3, 0.45);
+  frame.corridor = rng.uniform(1.7, 2.6);
+  frame.stairs = rng.uniform(2.7, 3.1);
+  frame.low =
+      kEntry + kLanding + steps_of(frame.pitch) * kGoing + 0.5 * frame.outer + 0.15 + rng.uniform(0.0, 0.6);
+  const int side = (options.rooms + 1) / 2;
+  const double length = std::max({side * rng.uniform(3.4, 4.4), (options.rooms - side) * 3.2 + frame.stairs,
+                                  6.5 + 3.2 * std::max(options.like, options.copies), 9.0});
+  frame.size = {length, frame.low + frame.corridor + rng.uniform(3.8, 6.0)};
+  return frame;
+}
+
+/// Nothing but the way from the corridor leads into the stairwell.
+void clear_stairs(Plan& plan) {
+  const auto kind = [&](int room) {
+    return room < 0 ? std::string() : plan.rooms[static_cast<std::size_t>(room)].kind;
+  };
+  std::vector<PlanOpening> kept;
+  for (PlanOpening& o : plan.openings) {
+    const bool stairs = kind(o.front) == "stairs" || kind(o.back) == "stairs";
+    const bool corridor = kind(o.front) == "corridor" || kind(o.back) == "corridor";
+    if (stairs && (!corridor || o.sill > 0.0)) continue;
+    if (stairs) o.leaf = Leaf::kNone;
+    kept.push_back(o);
+  }
+  plan.openings = std::move(kept);
+}
+
+/// Adds a storey to the whole plan, with the numbers of its rooms, walls and openings moved on.
+void append(const Plan& part, double floor, Plan& plan) {
+  const int rooms = static_cast<int>(plan.rooms.size()), walls = static_cast<int>(plan.walls.size()),
+            openings = static_cast<int>(plan.openings.size()), storey = static_cast<int>(plan.storeys.size());
+  plan.storeys.push_back(floor);
+  plan.walls.insert(plan.walls.end(), part.walls.begin(), part.walls.end());
+  for (PlanRoom room : part.rooms) {
+    room.storey = storey;
+    for (PlanFace& face : room.faces) face.wall += walls;
+    plan.rooms.push_back(room);
+  }
+  for (PlanOpening o : part.openings) {
+    o.wall += walls;
+    o.front += rooms;
+    if (o.back >= 0) o.back += rooms;
+    if (o.like >= 0) o.like += openings;
+    plan.openings.push_back(o);
+  }
+  for (PlanThing thing : part.things) {
+    thing.room += rooms;
+    plan.things.push_back(thing);
+  }
+  for (const int room : part.alike) plan.alike.push_back(room + rooms);
+}
+
+/// The rooms, openings and things of one storey; its walls keep their numbers.
+Plan storey_of(const Plan& plan, int storey) {
+  Plan part;
+  part.kind = plan.kind;
+  part.walls = plan.walls;
+  int first = -1;
+  for (std::size_t i = 0; i < plan.rooms.size(); ++i) {
+    if (plan.rooms[i].storey != storey) continue;
+    if (first < 0) first = static_cast<int>(i);
+    part.rooms.push_back(plan.rooms[i]);
+    part.rooms.back().storey = 0;
+  }
+  const int last = first + static_cast<int>(part.rooms.size());
+  for (PlanOpening o : plan.openings) {
+    if (o.front < first || o.front >= last) continue;
+    o.front -= first;
+    if (o.back >= 0) o.back -= first;
+    part.openings.push_back(o);
+  }
+  for (PlanThing thing : plan.things) {
+    if (thing.room < first || thing.room >= last) continue;
+    thing.room -= first;
+    part.things.push_back(thing);
+  }
+  return part;
+}
+
+const PlanRoom* stairs_of(const Plan& plan) {
+  const auto room = std::find_if(plan.rooms.begin(), plan.rooms.end(),
+                                 [](const PlanRoom& r) { return r.kind == "stairs"; });
+  return room == plan.rooms.end() ? nullptr : &*room;
+}
+
+}  // namespace
+
+bool build_building(const SynthOptions& options, std::uint64_t seed, Scene& scene, Plan& plan) {
+  Rng common(seed, 6);
+  const BuildingFrame frame = draw_frame(options, common);
+  plan.storeys.clear();
+  Builder builder(scene);
+
+  for (int storey = 0; storey < options.floors; ++storey) {
+    const std::uint64_t own = mix(seed, static_cast<std::uint64_t>(storey) + 1);
+    Rng cells(own, 1), rooms(own, 2), openings(own, 3), shell(own, 4), things(own, 5);
+    Plan part;
+    part.kind = plan.kind;
+    part.number = plan.number;
+    part.copies = plan.copies;
+    const int alike = std::max(options.like, options.copies);
+    if (!add_rooms(draw_storey(frame, options.rooms, alike, cells), rooms, part)) return false;
+    const bool lowest = storey == 0, highest = storey + 1 == options.floors;
+    for (PlanRoom& room : part.rooms) {
+      room.height = std::min(room.height, frame.height);
+      if (room.kind == "stairs") room.height = highest ? frame.height : frame.pitch;
+    }
+    if (!add_openings(openings, part)) return false;
+    clear_stairs(part);
+    const PlanRoom* stairs = stairs_of(part);
+    if (stairs == nullptr || !make_alike(part) || !connected(part)) return false;
+
+    const double floor = storey * frame.pitch;
+    const std::size_t faces = scene.faces.size(), lamps = scene.lamps.size(), leaves = scene.leaves.size();
+    build_shell(part, shell, builder);
+    const Stairwell well(*stairs, frame.pitch);
+    const int index = static_cast<int>(stairs - part.rooms.data());
+    build_stairs(well, index, lowest, highest, frame.height, builder);
+    part.things.push_back(
+        {"stairs", "stairs",
+         rectangle({0.0, 0.0}, 0.0, {well.x0 + 0.01, well.y0 + 0.01}, {well.x1 - 0.01, well.top()}), 0.0,
+         frame.pitch, index});
+
+    Ground ground(part);
+    ground.block(part.things.back().outline, false);
+    ground.recompute();
+    furnish(part, ground, things, builder);
+    for (std::size_t i = faces; i < scene.faces.size(); ++i) scene.faces[i].origin.z() += floor;
+    for (std::size_t i = lamps; i < scene.lamps.size(); ++i) scene.lamps[i].center.z() += floor;
+    for (std::size_t i = leaves; i < scene.leaves.size(); ++i) scene.leaves[i].hinge.z() += floor;
+    append(part, floor, plan);
+  }
+  return true;
+}
+
+RobotPath plan_building_path(const Plan& plan, Route route, int robot, Rng& rng) {
+  const int floors = static_cast<int>(plan.storeys.size()), start = robot % floors;
+  const double height = rng.uniform(1.35, 1.6);
+  std::vector<RobotPath> storeys;
+  std::optional<Stairwell> well;
+  for (int k = 0; k < floors; ++k) {
+    const Plan part = storey_of(plan, k);
+    const PlanRoom* stairs = stairs_of(part);
+    if (stairs == nullptr) return {};
+    if (!well) well.emplace(*stairs, floors > 1 ? plan.storeys[1] : 3.0);
+    storeys.push_back(plan_path(part, furnished_ground(part, 0), route, robot, rng, well->entry()));
+    if (storeys.back().waypoints.empty()) return {};
+  }
+
+  RobotPath path = storeys.front();
+  path.waypoints.clear();
+  const auto tour = [&](int k) {
+    for (Waypoint w : storeys[static_cast<std::size_t>(k)].waypoints) {
+      const Vector3d lift(0.0, 0.0, plan.storeys[static_cast<std::size_t>(k)] + height - w.position.z());
+      w.position += lift;
+      if (w.look) *w.look += lift;
+      path.waypoints.push_back(w);
+    }
+  };
+  const auto climb = [&](int from, int to) {
+    for (int k = from; k != to; k += to > from ? 1 : -1) {
+      std::vector<Vector3d> steps = well->climb();
+      const double floor = plan.storeys[static_cast<std::size_t>(to > from ? k : k - 1)];
+      if (to < from) std::reverse(steps.begin(), steps.end());
+      for (const Vector3d& p : steps) {
+        Waypoint w;
+        w.position = p + Vector3d(0.0, 0.0, floor + height);
+        w.pitch_rad = -0.15;
+        path.waypoints.push_back(w);
+      }
+    }
+  };
+
+  // Up from where it starts, then down over those below, and back.
+  int at = start;
+  tour(at);
+  for (int k = start + 1; k < floors; ++k) {
+    climb(k - 1, k);
+    tour(at = k);
+  }
+  for (int k = start - 1; k >= 0; --k) {
+    climb(at, k);
+    tour(at = k);
+  }
+  climb(at, start);
+  return path;
+}
+
+}  // namespace plumbline::synth
