@@ -103,9 +103,13 @@ struct SynthSource::Impl {
   std::shared_ptr<const CameraPath> path;
   std::vector<Stamps> frames;
   NoiseTiles tiles;
-  mutable std::vector<float> gains;  ///< automatic exposure, every kGainStep frames, as far as it was needed
-  mutable float level = 0.0F;        ///< of the last of them
-  mutable std::mutex gains_mutex;
+  /// Automatic exposure, every kGainStep frames, as far as it was needed; of all sources of this recording.
+  struct Exposures {
+    std::mutex mutex;
+    std::vector<float> gains;
+    float level = 0.0F;  ///< of the last of them
+  };
+  std::shared_ptr<Exposures> exposures = std::make_shared<Exposures>();
   static constexpr int kGainStep = 10;
 
   /// Pose of the camera, which looks ahead along the path if it is not one of a rig.
@@ -183,7 +187,9 @@ core::Result<void> SynthSource::Impl::check_way() const {
 float SynthSource::Impl::gain(std::int64_t number) const {
   const sensor::Camera small = make_camera(world->options.sensor, 64, 48, world->options.fps);
   const auto k = static_cast<std::size_t>(number / kGainStep);
-  const std::lock_guard<std::mutex> lock(gains_mutex);
+  const std::lock_guard<std::mutex> lock(exposures->mutex);
+  std::vector<float>& gains = exposures->gains;
+  float& level = exposures->level;
   for (std::size_t i = gains.size(); i < k + 2; ++i) {
     const double t = static_cast<double>(i * kGainStep) / world->options.fps;
     const float now = std::max(0.02F, mean_level(*world, look(*world, small.color, this->at(t))));
