@@ -240,7 +240,7 @@ sensor::CameraSigma sigma_of(const optimize::CameraPosterior& known, const senso
           sigma[optimize::kDelay]};
 }
 
-/// What is known of each number, in the order of numbers_of().
+/// Knowledge of each number, in the order of numbers_of().
 std::vector<CameraFinding> findings_of(const sensor::Camera& file, const sensor::Camera& camera,
                                        const optimize::CameraPosterior& known) {
   std::vector<CameraFinding> findings;

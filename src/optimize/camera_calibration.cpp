@@ -97,15 +97,18 @@ class PixelCost final : public ceres::SizedCostFunction<2, kCameraUnknowns, kSte
     if (row.p.z() < 0.05) return false;
     const Eigen::Vector2d ray(row.p.x() / row.p.z(), row.p.y() / row.p.z());
     sensor::Lens lens = camera_->lens();
+
     lens.k[0] += change[kK1];
     lens.k[1] += change[kK2];
     const Eigen::Vector2d distorted = lens.distort(ray);
     const sensor::Pinhole& c = camera_->color;
     const Eigen::Vector2d focal = Eigen::Vector2d(c.fx, c.fy) * (1.0 + change[kFocal]);
+
     const Eigen::Vector2d centre(c.cx + change[kCentreX], c.cy + change[kCentreY]);
     const double weight = 1.0 / seen_->pixel_sigma;
     Eigen::Map<Eigen::Vector2d>(residuals).noalias() =
         weight * (seen_->pixel - focal.cwiseProduct(distorted) - centre);
+
     if (jacobians == nullptr) return true;
 
     const Eigen::Matrix2d by_ray = lens.jacobian(ray);
@@ -113,11 +116,13 @@ class PixelCost final : public ceres::SizedCostFunction<2, kCameraUnknowns, kSte
     Eigen::Matrix<double, 2, 3> ray_by_p;
     ray_by_p << 1.0, 0.0, -ray.x(), 0.0, 1.0, -ray.y();
     const Eigen::Matrix<double, 2, 3> by_p = -weight / row.p.z() * focal.asDiagonal() * by_ray * ray_by_p;
+
     Eigen::Matrix<double, 2, kCameraUnknowns> by_camera = Eigen::Matrix<double, 2, kCameraUnknowns>::Zero();
     by_camera.col(kFocal) = -weight * Eigen::Vector2d(c.fx, c.fy).cwiseProduct(distorted);
     by_camera(0, kCentreX) = -weight;
     by_camera(1, kCentreY) = -weight;
     by_camera.col(kK1) = -weight * by_k.by_k1 * focal.cwiseProduct(ray);
+
     by_camera.col(kK2) = by_k.k2_by_k1 * by_camera.col(kK1);
     Derivatives<2>(jacobians).put(by_camera, by_p, row);
     return true;
@@ -240,6 +245,7 @@ std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, Came
   evidence.at = Eigen::Map<const CameraChange>(unknowns.change());
   std::vector<double> residuals;
   ceres::CRSMatrix crs;
+
   if (!ceres_problem.Evaluate(order, &evidence.cost, &residuals, nullptr, &crs)) return std::nullopt;
 
   const Eigen::SparseMatrix<double> jacobian = Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(
@@ -247,17 +253,20 @@ std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, Came
       crs.values.data());
   constexpr int kCamera = kCameraUnknowns;
   const int others = crs.num_cols - kCamera;
+
   const Eigen::SparseMatrix<double> by_others = jacobian.rightCols(others);
 
   const Eigen::MatrixXd by_camera = jacobian.leftCols(kCamera);
   Eigen::SparseMatrix<double> normal = by_others.transpose() * by_others;
   normal.diagonal() *= 1.0 + 1e-9;  // a point may be seen along one ray only
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);
+
   if (factor.info() != Eigen::Success) return std::nullopt;
 
-  // What is left of each row's derivative by the camera when poses and points follow it.
+  // The part of each row's derivative by the camera that remains when poses and points follow it.
   const Eigen::MatrixXd answered = factor.solve(Eigen::MatrixXd(by_others.transpose() * by_camera));
   const Eigen::MatrixXd alone = by_camera - by_others * answered;
+
   if (!alone.allFinite()) return std::nullopt;
 
   std::map<int, EvidenceBlock> blocks;
@@ -267,6 +276,7 @@ std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, Came
     const auto derivative = alone.middleRows(row, rows);
     const Eigen::Map<const Eigen::VectorXd> residual(residuals.data() + row, rows);
     EvidenceBlock& block = blocks[problem.poses[static_cast<std::size_t>(o.pose)].block];
+
     block.gradient += derivative.transpose() * residual;
     block.information += derivative.transpose() * derivative;
     row += rows;
@@ -277,6 +287,7 @@ std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, Came
     evidence.all.information += block.information;
     evidence.blocks.push_back(block);
   }
+
   return evidence;
 }
 

@@ -147,6 +147,7 @@ CameraPosterior camera_posterior(const std::vector<CameraEvidence>& evidence, co
   double most = cases.front().log_weight;
   for (const Case& one : cases) most = std::max(most, one.log_weight);
   double sum = 0.0;
+
   for (Case& one : cases) sum += std::exp(one.log_weight - most);
 
   CameraPosterior posterior;
@@ -155,11 +156,13 @@ CameraPosterior camera_posterior(const std::vector<CameraEvidence>& evidence, co
     posterior.mean += weight * one.mean;
     for (std::size_t g = 0; g < kCameraGroups; ++g) posterior.wrong[g] += one.wrong[g] ? weight : 0.0;
   }
+
   for (const Case& one : cases) {
     const double weight = std::exp(one.log_weight - most) / sum;
     const CameraChange off = one.mean - posterior.mean;
     posterior.covariance += weight * (one.covariance + off * off.transpose());
   }
+
   return posterior;
 }
 

@@ -55,6 +55,9 @@ struct CalibrationOptions {
   double wrong = 0.3;  ///< probability that a group of numbers is wrong, before anything is seen
 };
 
+/// CameraCalibration::news from which a file that seemed right is wrong.
+constexpr double kFileIsWrong = 2.5;
+
 struct CameraCalibration {
   sensor::Camera camera;
   sensor::CameraSigma sigma;  ///< its standard deviations

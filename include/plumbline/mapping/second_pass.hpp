@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What was mapped before the camera was known is mapped once more with it (docs/method/calibration.md): a
-// wrong camera makes the tracker reject right matches, which no adjustment of the map brings back.
+// The part of a recording that came before its camera was known is mapped once more
+// (docs/method/calibration.md): a wrong camera makes the tracker reject right matches, which no adjustment of
+// the map brings back.
 #include <cstdint>
 #include <functional>
 #include <memory>

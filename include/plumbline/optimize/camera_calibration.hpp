@@ -95,7 +95,7 @@ struct CameraPrior {
   std::array<double, kCameraGroups> wrong{};        ///< probability, 0 to 1
 };
 
-/// What is known of a camera: mean and covariance of a mixture over which groups of the file are wrong.
+/// Knowledge of a camera: mean and covariance of a mixture over which groups of the file are wrong.
 struct CameraPosterior {
   CameraChange mean = CameraChange::Zero();
   CameraCovariance covariance = CameraCovariance::Zero();

@@ -159,7 +159,7 @@ struct RunHooks {
   std::function<void(const std::string&)> finishing;  ///< RunRequest::finishing
 };
 
-/// What a stage does for others besides its outputs.
+/// Work that a stage does for others besides its outputs.
 struct RunServices {
   /// The features of a robot's frame, as the pipeline finds them; empty: it has no such stage. May be called
   /// from several threads at a time.

@@ -161,12 +161,11 @@ core::Result<void> calibrate(const CalibrateRequest& request, Session& session) 
   if (!calibration) return tl::unexpected<core::Error>(calibration.error());
   if (!session.quiet) print_calibration(*calibration);
 
-  const auto& findings = calibration->findings;
-  const bool any = std::any_of(findings.begin(), findings.end(), [](const auto& f) { return f.used; });
-  if (!any && !session.quiet) print("the given camera fits; nothing better was found\n");
+  const bool fits = calibration->news < mapping::kFileIsWrong;
+  if (fits && !session.quiet) print("the given camera fits; nothing better was found\n");
 
   if (request.output.empty()) return {};
-  sensor::Camera camera = calibration->camera;
+  sensor::Camera camera = fits ? mapped.camera() : calibration->camera;
   camera.sigma = calibration->sigma;
   const std::string yaml = "# found by plumbline calibrate\n" + sensor::to_yaml(camera);
   if (auto written = core::write_file(request.output, yaml); !written) return written;

@@ -13,7 +13,6 @@ namespace {
 
 // Change of a number, in standard deviations, for which a map is made anew: a file that seems right is left
 // alone; once it is known to be wrong, smaller changes follow.
-constexpr double kFirstNews = 2.5;
 constexpr double kLaterNews = 1.0;
 constexpr double kGuessedFocalSigma = 0.01;  // a guess is confirmed when its focal length is known so well
 
@@ -92,7 +91,7 @@ bool CameraRefinement::ask(const maps::Map& map, const std::vector<maps::FramePo
   const bool knows_less =
       2 * found->views < views_;  // than the question before: a second pass has fewer frames
   views_ = std::max(views_, found->views);
-  const bool better = !knows_less && found->news >= (changed_ ? kLaterNews : kFirstNews);
+  const bool better = !knows_less && found->news >= (changed_ ? kLaterNews : mapping::kFileIsWrong);
   if (report_.asked > 1 && !better) return false;
   report_.findings = found->findings;
   report_.gain = found->gain;

@@ -22,6 +22,7 @@ core::Result<std::vector<Edit>> read_edits(const std::string& file) {
   if (!root) return tl::unexpected<core::Error>(root.error());
   core::ConfigProblems problems;
   std::vector<Edit> edits;
+
   if (root->kind != core::ConfigNode::Kind::kSequence)
     problems.push_back({root->mark, "", "a file of edits is a list: '- {move: desk 14, by: [0.3, 0]}'"});
 
@@ -32,6 +33,7 @@ core::Result<std::vector<Edit>> read_edits(const std::string& file) {
     table.text("move", edit.move, "Name of the thing to move by `by` and to turn by `turn`");
     table.text("remove", edit.remove, "Name of the thing to take away");
     table.text("add", edit.add, "Kind of thing to add at `at`");
+
     table.text("wall", edit.wall, "Wall to move sideways by `shift`");
     table.integer("door", edit.door, {0, 10000}, "", "Door to open to `open`");
     table.number("light", edit.light, {0.01, 100.0}, "", "Factor on all light");
@@ -39,6 +41,7 @@ core::Result<std::vector<Edit>> read_edits(const std::string& file) {
     table.numbers("at", edit.at, 0, {-1000.0, 1000.0}, "m", "Place");
     table.numbers("size", edit.size, 3, {0.01, 20.0}, "m", "Size");
     table.number("turn", edit.turn_rad, {-7.0, 7.0}, "rad", "Angle to turn by");
+
     table.number("yaw", edit.yaw_rad, {-7.0, 7.0}, "rad", "Direction");
     table.number("shift", edit.shift, {-1.0, 1.0}, "m", "Way to the left of the wall's direction");
     table.number("open", edit.open_rad, {0.0, 3.1}, "rad", "Angle of the leaf; 0: shut");
@@ -46,6 +49,7 @@ core::Result<std::vector<Edit>> read_edits(const std::string& file) {
     table.set_all(root->items[i], fmt::format("[{}]", i), problems);
     edits.push_back(std::move(edit));
   }
+
   if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));
   return edits;
 }
@@ -129,6 +133,7 @@ class Draw {
     const std::string& name = scene_.objects[static_cast<std::size_t>(object)].name;
     const double kind = rng_.uniform();
     Edit edit;
+
     if (kind < 0.15) {
       edit.remove = name;
       return editor_.apply(edit).has_value();
@@ -139,10 +144,12 @@ class Draw {
     const double turn = far == 0.0 || rng_.chance(0.3) ? rng_.uniform(-1.5, 1.5) : 0.0;
     const Eigen::AlignedBox3d box = editor_.box(object);
     const Vector2d middle = box.center().head<2>();
+
     std::vector<Vector2d> place;
     for (const Vector2d& p : editor_.outline(object))
       place.push_back(middle + by + Eigen::Rotation2Dd(turn) * (p - middle));
     const bool adds = kind > 0.85;
+
     if (adds) {
       const Vector2d at = middle + 1.5 * by;
       place = rectangle(at, turn, {-0.25, -0.2}, {0.25, 0.2});
@@ -152,9 +159,11 @@ class Draw {
       edit.yaw_rad = turn;
     } else {
       edit.move = name;
+
       edit.by = {by.x(), by.y()};
       edit.turn_rad = turn;
     }
+
     return fits(adds ? -1 : object, name, place, box) && editor_.apply(edit).has_value();
   }
 
@@ -179,10 +188,12 @@ class Draw {
       const bool own = std::find(gone.begin(), gone.end(), face.object) != gone.end();
       if (!own && !editor_.removed(face.object)) rest.faces.push_back(face);
     }
+
     double floor = 0.0;
     for (const double storey : scene_.plan ? scene_.plan->storeys : std::vector<double>{}) {
       if (storey < box.min().z() + 0.2) floor = storey;
     }
+
     if (!Ground(rest, floor).is_free(place)) return false;
     return !scene_.plan || leaves_ways(name, object < 0, place, box.max().z() - box.min().z());
   }
@@ -192,10 +203,12 @@ class Draw {
     const Plan& plan = *scene_.plan;
     const auto thing = std::find_if(plan.things.begin(), plan.things.end(),
                                     [&](const PlanThing& t) { return t.name == name; });
+
     if (thing == plan.things.end()) return false;
     const PlanRoom& room = plan.rooms[static_cast<std::size_t>(thing->room)];
     if (!std::all_of(place.begin(), place.end(), [&](const Vector2d& p) { return room.contains(p); }))
       return false;
+
     for (const PlanOpening& o : plan.openings) {
       if (o.front != thing->room && o.back != thing->room) continue;
       for (const Vector2d& p : place) {

@@ -134,6 +134,7 @@ core::Result<void> Editor::move(const Edit& edit) {
       lamp.center = motion * lamp.center;
       for (Vector3d* axis : {&lamp.half_u, &lamp.half_v}) *axis = motion.rotation * *axis;
     }
+
     for (Face& face : scene_.faces) {
       if (face.object == k) transform(face, motion);
     }
@@ -145,6 +146,7 @@ core::Result<void> Editor::move(const Edit& edit) {
     if (thing.name != edit.move) continue;
     for (Vector2d& p : thing.outline) p = (motion * Vector3d(p.x(), p.y(), 0.0)).head<2>();
   }
+
   return {};
 }
 
@@ -172,15 +174,18 @@ core::Result<void> Editor::add(const Edit& edit) {
       edit.size.size() == 3 ? Vector3d(edit.size[0], edit.size[1], edit.size[2]) : Vector3d(0.4, 0.4, 0.4);
   const Vector3d at(edit.at[0], edit.at[1], edit.at.size() > 2 ? edit.at[2] : 0.0);
   Builder builder(scene_);
+
   builder.begin_object(edit.add, fmt::format("added {} {}", edit.add, scene_.changes.size()), edit.mark);
   add_thing(builder, edit.add, upright(at, edit.yaw_rad), size, edit.material);
   const int object = static_cast<int>(scene_.objects.size()) - 1;
+
   if (box(object).isEmpty())
     return wrong(edit, fmt::format("add: things of the type '{}' cannot be added", edit.add));
 
   SceneChange& change = note("added", object);
   change.after = change.before;
   change.before.setEmpty();
+
   if (!scene_.plan) return {};
   for (std::size_t r = 0; r < scene_.plan->rooms.size(); ++r) {
     const PlanRoom& room = scene_.plan->rooms[r];
@@ -189,6 +194,7 @@ core::Result<void> Editor::add(const Edit& edit) {
     scene_.plan->things.push_back({change.thing, edit.add, outline(object), change.after.min().z() - floor,
                                    change.after.max().z() - floor, static_cast<int>(r)});
   }
+
   return {};
 }
 
@@ -198,6 +204,7 @@ std::optional<Editor::Slab> Editor::slab(const std::string& wall) const {
     slab.from = std::min(slab.from, slab.along.dot(p - slab.origin));
     slab.to = std::max(slab.to, slab.along.dot(p - slab.origin));
   };
+
   const auto number = core::to_number(wall);
 
   if (scene_.plan) {
@@ -207,6 +214,7 @@ std::optional<Editor::Slab> Editor::slab(const std::string& wall) const {
     const PlanWall& w = plan.walls[static_cast<std::size_t>(index)];
     slab.origin = w.origin;
     slab.along = w.direction;
+
     slab.half = 0.5 * w.thickness;
 
     // Objects of walls and openings are in the order of the plan.
@@ -216,6 +224,7 @@ std::optional<Editor::Slab> Editor::slab(const std::string& wall) const {
       if (scene_.objects[k].type == "opening") openings.push_back(static_cast<int>(k));
     }
     std::size_t next = 0;
+
     for (const PlanRoom& room : plan.rooms) {
       for (const PlanFace& face : room.faces) {
         const int object = walls[next++];
@@ -228,11 +237,13 @@ std::optional<Editor::Slab> Editor::slab(const std::string& wall) const {
         extend(face.to);
       }
     }
+
     for (std::size_t i = 0; i < plan.openings.size(); ++i) {
       if (plan.openings[i].wall == index) slab.objects.push_back(openings[i]);
     }
   } else {
     const int object = find(wall);
+
     if (object < 0 || scene_.objects[static_cast<std::size_t>(object)].type != "wall") return std::nullopt;
     const auto face = std::find_if(scene_.faces.begin(), scene_.faces.end(),
                                    [&](const Face& f) { return f.object == object; });
@@ -240,12 +251,14 @@ std::optional<Editor::Slab> Editor::slab(const std::string& wall) const {
     slab.along = front.u_axis.head<2>();
     slab.half = 0.5 * std::abs(front.normal.dot(front.origin - back.origin));
     slab.origin = (front.origin - slab.half * front.normal).head<2>();
+
     slab.objects = {object};
     for (const Face& f : scene_.faces) {
       if (f.object != object || std::abs(f.normal.dot(front.normal)) < 0.9) continue;
       for (const Vector2d& uv : f.polygon) extend(f.at(uv.x(), uv.y()).head<2>());
     }
   }
+
   slab.normal = {-slab.along.y(), slab.along.x()};
   return slab.from < slab.to ? std::optional<Slab>(slab) : std::nullopt;
 }
@@ -271,6 +284,7 @@ core::Result<void> Editor::shift_wall(const Edit& edit) {
     return wrong(edit, fmt::format("wall: {} '{}'; walls are numbered in plan.json, and named in scene files",
                                    s ? "another wall is not square to" : "there is no", edit.wall));
   }
+
   SceneChange& change = note("wall", s->objects.front());
   if (scene_.plan) change.thing = "wall " + edit.wall;
   const Vector3d by(edit.shift * s->normal.x(), edit.shift * s->normal.y(), 0.0);
@@ -300,6 +314,7 @@ core::Result<void> Editor::shift_wall(const Edit& edit) {
     if (rigid[static_cast<std::size_t>(scene_.faces[leaf.first].object)] != 0) leaf.hinge += by;
   }
   change.after = change.before.translated(by);
+
   if (!scene_.plan) return {};
   for (PlanRoom& room : scene_.plan->rooms) {
     const double floor = scene_.plan->storeys[static_cast<std::size_t>(room.storey)];
@@ -310,6 +325,7 @@ core::Result<void> Editor::shift_wall(const Edit& edit) {
       }
     }
   }
+
   scene_.plan->walls[static_cast<std::size_t>(std::stoi(edit.wall))].origin += by.head<2>();
   return {};
 }
@@ -336,23 +352,27 @@ core::Result<void> Editor::turn_door(const Edit& edit) {
                              "counted in scene files, both from 0",
                              edit.door));
   }
+
   SceneChange& change = note("door", scene_.faces[door->first].object);
   if (scene_.plan) change.thing = fmt::format("opening {}", edit.door);
   change.turn_rad = door->open_rad - edit.open_rad;
   change.before.setEmpty();
   const Rigid3 motion = moved(door->hinge, change.turn_rad, Vector3d::Zero());
+
   for (std::size_t i = door->first; i < door->first + door->count; ++i) {
     Face& face = scene_.faces[i];
     for (const Vector2d& uv : face.polygon) change.before.extend(face.at(uv.x(), uv.y()));
     transform(face, motion);
     for (const Vector2d& uv : face.polygon) change.after.extend(face.at(uv.x(), uv.y()));
   }
+
   door->open_rad = edit.open_rad;
 
   if (!scene_.plan) return {};
   PlanOpening& o = scene_.plan->openings[static_cast<std::size_t>(edit.door)];
   o.open_rad = edit.open_rad;
   o.leaf = edit.open_rad < 0.02 ? Leaf::kShut : edit.open_rad < 0.9 ? Leaf::kAjar : Leaf::kOpen;
+
   return {};
 }
 
@@ -363,6 +383,7 @@ core::Result<void> Editor::apply(const Edit& edit) {
     for (const Object& object : scene_.objects) names.push_back(object.name);
     return wrong(edit, fmt::format("there is no '{}'{}", name, core::hint(name, names)));
   }
+
   if (!edit.move.empty()) return move(edit);
   if (!edit.remove.empty()) return remove(edit);
   if (!edit.add.empty()) return add(edit);
@@ -371,9 +392,11 @@ core::Result<void> Editor::apply(const Edit& edit) {
   if (!(edit.light > 0.0)) {
     return wrong(edit, "an edit has one of move, remove, add, wall, door, light");
   }
+
   scene_.ambient *= edit.light;
   for (Lamp& lamp : scene_.lamps) lamp.power *= edit.light;
   note("light", -1).factor = edit.light;
+
   return {};
 }
 

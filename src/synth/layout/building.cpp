@@ -80,12 +80,14 @@ void build_stairs(const Stairwell& well, int index, bool lowest, bool highest, d
   const double ceiling = highest ? height : pitch - kSlab;
   add_ceiling_lamp(b, upright({m, well.y1 - 0.5 * kEntry, ceiling}, 0.0), 0.5, 0.5, 9.0);
   b.begin_object("stairs", "", mark);
+
   if (highest) {
     b.polygon({{well.x0, well.y1, height},
                {well.x1, well.y1, height},
                {well.x1, well.y0, height},
                {well.x0, well.y0, height}},
               Vector3d::UnitX(), {"ceiling"});
+
     if (lowest) return;
     solid({well.x0, well.top() - 0.05, 0.0}, {m - 0.05, well.top(), 1.0}, "paint_grey");
     solid({m - 0.05, well.bottom(), 0.0}, {m + 0.05, well.top(), 1.0}, "paint_grey");
@@ -95,6 +97,7 @@ void build_stairs(const Stairwell& well, int index, bool lowest, bool highest, d
   solid({m - 0.05, well.bottom(), 0.0}, {m + 0.05, well.top(), pitch}, "plaster");
   solid({well.x0, well.y0, 0.5 * pitch - 0.25}, {well.x1, well.bottom(), 0.5 * pitch}, "tiles");
   const int n = steps_of(pitch);
+
   for (int i = 0; i < n; ++i) {
     const double z = 0.5 * pitch * (i + 1) / n, a = well.top() - i * kGoing, c = well.bottom() + i * kGoing;
     solid({well.x0, a - kGoing, std::max(0.0, z - 0.25)}, {m - 0.05, a, z}, "lino");
@@ -140,11 +143,13 @@ void append(const Plan& part, double floor, Plan& plan) {
             openings = static_cast<int>(plan.openings.size()), storey = static_cast<int>(plan.storeys.size());
   plan.storeys.push_back(floor);
   plan.walls.insert(plan.walls.end(), part.walls.begin(), part.walls.end());
+
   for (PlanRoom room : part.rooms) {
     room.storey = storey;
     for (PlanFace& face : room.faces) face.wall += walls;
     plan.rooms.push_back(room);
   }
+
   for (PlanOpening o : part.openings) {
     o.wall += walls;
     o.front += rooms;
@@ -152,10 +157,12 @@ void append(const Plan& part, double floor, Plan& plan) {
     if (o.like >= 0) o.like += openings;
     plan.openings.push_back(o);
   }
+
   for (PlanThing thing : part.things) {
     thing.room += rooms;
     plan.things.push_back(thing);
   }
+
   for (const int room : part.alike) plan.alike.push_back(room + rooms);
 }
 
@@ -165,12 +172,14 @@ Plan storey_of(const Plan& plan, int storey) {
   part.kind = plan.kind;
   part.walls = plan.walls;
   int first = -1;
+
   for (std::size_t i = 0; i < plan.rooms.size(); ++i) {
     if (plan.rooms[i].storey != storey) continue;
     if (first < 0) first = static_cast<int>(i);
     part.rooms.push_back(plan.rooms[i]);
     part.rooms.back().storey = 0;
   }
+
   const int last = first + static_cast<int>(part.rooms.size());
   for (PlanOpening o : plan.openings) {
     if (o.front < first || o.front >= last) continue;
@@ -178,11 +187,13 @@ Plan storey_of(const Plan& plan, int storey) {
     if (o.back >= 0) o.back -= first;
     part.openings.push_back(o);
   }
+
   for (PlanThing thing : plan.things) {
     if (thing.room < first || thing.room >= last) continue;
     thing.room -= first;
     part.things.push_back(thing);
   }
+
   return part;
 }
 
@@ -207,6 +218,7 @@ bool build_building(const SynthOptions& options, std::uint64_t seed, Scene& scen
     part.kind = plan.kind;
     part.number = plan.number;
     part.copies = plan.copies;
+
     const int alike = std::max(options.like, options.copies);
     if (!add_rooms(draw_storey(frame, options.rooms, alike, cells), rooms, part)) return false;
     const bool lowest = storey == 0, highest = storey + 1 == options.floors;
@@ -214,6 +226,7 @@ bool build_building(const SynthOptions& options, std::uint64_t seed, Scene& scen
       room.height = std::min(room.height, frame.height);
       if (room.kind == "stairs") room.height = highest ? frame.height : frame.pitch;
     }
+
     if (!add_openings(openings, part)) return false;
     clear_stairs(part);
     const PlanRoom* stairs = stairs_of(part);
@@ -235,10 +248,12 @@ bool build_building(const SynthOptions& options, std::uint64_t seed, Scene& scen
     ground.recompute();
     furnish(part, ground, things, builder);
     for (std::size_t i = faces; i < scene.faces.size(); ++i) scene.faces[i].origin.z() += floor;
+
     for (std::size_t i = lamps; i < scene.lamps.size(); ++i) scene.lamps[i].center.z() += floor;
     for (std::size_t i = leaves; i < scene.leaves.size(); ++i) scene.leaves[i].hinge.z() += floor;
     append(part, floor, plan);
   }
+
   return true;
 }
 
@@ -247,12 +262,14 @@ RobotPath plan_building_path(const Plan& plan, Route route, int robot, Rng& rng)
   const double height = rng.uniform(1.35, 1.6);
   std::vector<RobotPath> storeys;
   std::optional<Stairwell> well;
+
   for (int k = 0; k < floors; ++k) {
     const Plan part = storey_of(plan, k);
     const PlanRoom* stairs = stairs_of(part);
     if (stairs == nullptr) return {};
     if (!well) well.emplace(*stairs, floors > 1 ? plan.storeys[1] : 3.0);
     storeys.push_back(plan_path(part, furnished_ground(part, 0), route, robot, rng, well->entry()));
+
     if (storeys.back().waypoints.empty()) return {};
   }
 
@@ -266,6 +283,7 @@ RobotPath plan_building_path(const Plan& plan, Route route, int robot, Rng& rng)
       path.waypoints.push_back(w);
     }
   };
+
   const auto climb = [&](int from, int to) {
     for (int k = from; k != to; k += to > from ? 1 : -1) {
       std::vector<Vector3d> steps = well->climb();
@@ -283,15 +301,18 @@ RobotPath plan_building_path(const Plan& plan, Route route, int robot, Rng& rng)
   // Up from where it starts, then down over those below, and back.
   int at = start;
   tour(at);
+
   for (int k = start + 1; k < floors; ++k) {
     climb(k - 1, k);
     tour(at = k);
   }
+
   for (int k = start - 1; k >= 0; --k) {
     climb(at, k);
     tour(at = k);
   }
   climb(at, start);
+
   return path;
 }
 

@@ -260,6 +260,7 @@ bool add_rooms(const Subdivision& cells, Rng& rng, Plan& plan) {
     const auto outer = std::min_element(room.faces.begin(), room.faces.end(),
                                         [](const PlanFace& a, const PlanFace& b) { return a.wall < b.wall; });
     std::rotate(room.faces.begin(), outer, room.faces.end());
+
     plan.alike.push_back(static_cast<int>(i));
   }
 
@@ -268,6 +269,7 @@ bool add_rooms(const Subdivision& cells, Rng& rng, Plan& plan) {
     PlanRoom& room = plan.rooms[i];
     const double area = room.area();
     const bool limited = room.kind.empty();
+
     if (area < 4.0 && limited) return false;
     if (area > 60.0 && limited) return false;
 
@@ -282,12 +284,14 @@ bool add_rooms(const Subdivision& cells, Rng& rng, Plan& plan) {
                                ? rng.pick(std::vector<std::string>{"brick", "wood", "poster_wall"})
                                : room.wall_material;
   }
+
   for (const int like : plan.alike) {
     PlanRoom &room = plan.rooms[static_cast<std::size_t>(like)],
              copy = plan.rooms[static_cast<std::size_t>(plan.alike.front())];
     copy.faces = room.faces;
     room = copy;
   }
+
   return plan.rooms.size() > 1;
 }
 

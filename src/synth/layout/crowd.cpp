@@ -67,6 +67,7 @@ class Day {
     turn(heading(line, 0.0));
     const int count = std::max(1, static_cast<int>(std::lround(length / (0.28 + 0.3 * speed_))));
     const double step = length / count;
+
     const Vector3d start[2] = {now_.foot[0], now_.foot[1]};
     const auto footprint = [&](int k, int side) {
       if (k <= 0) return start[side];
@@ -161,6 +162,7 @@ class Stage {
       if (fronts[k] == nullptr) fronts[k] = &face;
       for (const Vector2d& uv : face.polygon) boxes[k].extend(face.at(uv.x(), uv.y()));
     }
+
     for (std::size_t k = 0; k < boxes.size(); ++k) {
       const std::string& type = scene.objects[k].type;
       if ((type != "sofa" && type != "chair" && type != "bed") || fronts[k] == nullptr) continue;
@@ -169,6 +171,7 @@ class Stage {
       const Eigen::AlignedBox2d b = front.bounds();
       const Vector2d out = front.normal.head<2>(),
                      middle = front.at(b.center().x(), b.center().y()).head<2>();
+
       const Vector2d at = middle + 0.28 * out;
       if (ground_.walkable(ground_.cell_of(at))) seats_.push_back({at, bearing({0.0, 0.0}, out)});
     }
@@ -249,6 +252,7 @@ bool add_people(int count, int seed, Scene& scene) {
                                                     "rug",     "lampshade", "leaf"};
   std::map<double, Stage> stages;
   const std::vector<Waypoint>& path = scene.robots.front().waypoints;
+
   Rng rng(static_cast<std::uint64_t>(seed), 0x3a1c);
 
   for (int tries = 0; scene.walkers.size() < wanted && tries < 100; ++tries) {
@@ -265,6 +269,7 @@ bool add_people(int count, int seed, Scene& scene) {
     if (!home) continue;
     const Vector2d other = stage.opposite(*home).value_or(*home);
     std::vector<Day> days;
+
     for (const Vector2d& at : {*home, other}) {
       if (at == *home && !days.empty()) break;
       const Vector2d& to = days.empty() ? other : *home;
@@ -283,6 +288,7 @@ bool add_people(int count, int seed, Scene& scene) {
       scene.walkers.push_back(std::move(person));
     }
   }
+
   return scene.walkers.size() >= wanted;
 }
 

@@ -131,6 +131,7 @@ class Furnisher {
                       things = plan_.things.size();
     const auto& like = plan_.alike;
     fill(like.front(), fullness);
+
     const std::size_t ends[] = {scene.objects.size(), scene.faces.size(), scene.lamps.size(),
                                 plan_.things.size()};
 
@@ -142,6 +143,7 @@ class Furnisher {
       const auto name = [&](std::size_t object) {
         return fmt::format("{} {}", scene.objects[object].type, base + object - objects + 1);
       };
+
       for (std::size_t k = objects; k < ends[0]; ++k) {
         scene.objects.push_back(scene.objects[k]);
         scene.objects.back().name = name(k);
@@ -157,6 +159,7 @@ class Furnisher {
           face.seed = face.object + 1;
         scene.faces.push_back(std::move(face));
       }
+
       for (std::size_t k = lamps; k < ends[2]; ++k) {
         scene.lamps.push_back(scene.lamps[k]);
         scene.lamps.back().center += shift;
@@ -238,6 +241,7 @@ class Furnisher {
       item.frame = placed(item.frame, {x, -half.y() - 0.03, 0.0}, {0.0, Vector3d::UnitZ()});
     } else {
       Eigen::AlignedBox2d box;
+
       for (const PlanFace& f : room().faces) box.extend(f.from);
       const double turn =
           rng_.integer(0, 3) * 0.5 * M_PI + (rng_.chance(0.3) ? rng_.uniform(-0.4, 0.4) : 0.0);
@@ -259,6 +263,7 @@ class Furnisher {
                            .dot(item.frame.rotation.col(0));
       hung_[static_cast<std::size_t>(room_)][face].push_back({x - half.x(), x + half.x()});
     }
+
     return true;
   }
 

@@ -64,6 +64,7 @@ Ground::Ground(const Scene& scene, double floor) {
     if (signed_area(out) < 0.0) std::reverse(out.begin(), out.end());
     return out;
   };
+
   const auto is_floor = [&](const Face& face) {
     return face.normal.z() > 0.99 && std::abs(face.origin.z() - floor) < 0.03;
   };
@@ -73,15 +74,18 @@ Ground::Ground(const Scene& scene, double floor) {
     if (!is_floor(face)) continue;
     for (const Vector2d& p : outline(face)) box.extend(p);
   }
+
   const bool bare = box.isEmpty();  // without a floor people walk on nothing, near the paths
   for (const RobotPath& robot : scene.robots) {
     for (const Waypoint& w : robot.waypoints) {
       for (const double d : {-2.0, 2.0}) box.extend(Vector2d(w.position.head<2>() + Vector2d(d, d)));
     }
   }
+
   origin_ = box.min();
   const Vector2d cells = box.sizes() / kCell;
   free_ = cv::Mat1b(static_cast<int>(cells.y()) + 1, static_cast<int>(cells.x()) + 1, uchar(bare ? 1 : 0));
+
   for (const Face& face : scene.faces) {
     if (is_floor(face)) fill(free_, outline(face), 1);
   }
@@ -93,6 +97,7 @@ Ground::Ground(const Scene& scene, double floor) {
       low = std::min(low, z);
       high = std::max(high, z);
     }
+
     if (high < 0.1 || low > 1.8) continue;
 
     const std::vector<Vector2d> corners = outline(face);
@@ -106,6 +111,7 @@ Ground::Ground(const Scene& scene, double floor) {
       }
     }
   }
+
   see_ = free_.clone();
   recompute();
 }
@@ -233,10 +239,12 @@ bool Ground::try_block(const std::vector<Vector2d>& outline, bool hides_view,
     if (known.empty()) known = flood(distance, c);
     connected = connected && known(c) != 0;
   }
+
   if (!connected || cv::countNonZero(known & inside(part)) < least * cv::countNonZero(inside)) {
     before.copyTo(free_(part));
     return false;
   }
+
   if (hides_view) fill(see_, outline, 0);
   return true;
 }
@@ -260,6 +268,7 @@ std::vector<Vector2d> Ground::way(const Vector2d& from, const Vector2d& to) cons
   const auto push = [&](const cv::Point& c, float value, int from_cell) {
     if (value >= cost(c)) return;
     cost(c) = value;
+
     before(c) = from_cell;
     const auto d = goal - c;
     open.push(
@@ -288,6 +297,7 @@ std::vector<Vector2d> Ground::way(const Vector2d& from, const Vector2d& to) cons
   for (int cell = goal.y * columns + goal.x; cell >= 0; cell = before(cell / columns, cell % columns))
     way.push_back(middle_of({cell % columns, cell / columns}));
   std::reverse(way.begin(), way.end());
+
   return way;
 }
 

@@ -21,6 +21,7 @@ core::Result<std::optional<Scene>> try_layout(const std::string& kind, const Syn
   const int number = options.layout;
   const std::uint64_t seed = mix(static_cast<std::uint64_t>(number), static_cast<std::uint64_t>(attempt) + 1,
                                  static_cast<std::uint64_t>(kind[0]));
+
   Plan plan;
   plan.kind = kind;
   plan.number = number;
@@ -30,12 +31,14 @@ core::Result<std::optional<Scene>> try_layout(const std::string& kind, const Syn
   scene.description = fmt::format("{} from the number {}", kind, number);
   scene.file = fmt::format("{}?layout={}", kind, number);
   scene.ambient = 0.35;
+
   const bool building = kind == "building";
   plan.copies = options.copies > 1;
   if (building) {
     if (!build_building(options, seed, scene, plan)) return nothing;
   } else {
     Rng cells(seed, 1), rooms(seed, 2), openings(seed, 3), shell(seed, 4), things(seed, 5);
+
     if (!add_rooms(draw_cells(kind, std::max(options.like, options.copies), cells), rooms, plan) ||
         !add_openings(openings, plan) || !make_alike(plan)) {
       return nothing;
@@ -43,6 +46,7 @@ core::Result<std::optional<Scene>> try_layout(const std::string& kind, const Syn
     Builder builder(scene);
     build_shell(plan, shell, builder);
     ground = Ground(plan);
+
     furnish(plan, *ground, things, builder);
   }
 
@@ -62,6 +66,7 @@ core::Result<std::optional<Scene>> try_layout(const std::string& kind, const Syn
                                     : plan_path(*scene.plan, *ground, options.path, robot, walk));
     if (scene.robots.back().waypoints.empty()) return nothing;
   }
+
   return scene;
 }
 
@@ -78,11 +83,13 @@ core::Result<Scene> make_layout(const std::string& kind, const SynthOptions& opt
     return core::usage_error(
         fmt::format("layout: '{}' has no layouts; {} have", kind, fmt::join(kinds, ", ")));
   }
+
   if (std::max(options.like, options.copies) > 1 && (kind == "home" || kind == "corridor")) {
     return core::usage_error(
         fmt::format("like, copies: a {} has no rooms alike; office and building have", kind));
   }
   constexpr int kAttempts = 200;
+
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     auto scene = try_layout(kind, options, attempt, false);
     if (!scene) return tl::unexpected<core::Error>(scene.error());
@@ -96,6 +103,7 @@ core::Result<Scene> make_layout(const std::string& kind, const SynthOptions& opt
         "changes: {} leaves no way into one of the rooms; shut no door and move nothing that cuts it off",
         options.changes));
   }
+
   return core::usage_error(
       fmt::format("layout: no {} could be made from the number {}; take another one", kind, options.layout));
 }

@@ -283,6 +283,7 @@ bool make_alike(Plan& plan) {
            std::any_of(room(second).faces.begin(), room(second).faces.end(), has) &&
            wall != room(first).faces[1].wall && wall != room(first).faces[3].wall;
   };
+
   std::vector<PlanOpening> kept;
   for (const PlanOpening& o : plan.openings) {
     const bool of_first = o.front == first || o.back == first;
@@ -304,6 +305,7 @@ bool make_alike(Plan& plan) {
       kept.push_back(o);
     }
   }
+
   plan.openings = std::move(kept);
   return connected(plan);
 }

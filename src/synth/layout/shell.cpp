@@ -249,12 +249,14 @@ void build_shell(const Plan& plan, Rng& rng, Builder& builder) {
         std::find(plan.alike.begin(), plan.alike.end(), static_cast<int>(i)) != plan.alike.end();
     const bool copy = like && static_cast<int>(i) != plan.alike.front();
     const std::size_t begin = faces.size();
+
     if (like && !copy) {
       first = begin;
       first_rng = rng;
     }
     Rng same = first_rng;
     shell.add_room(static_cast<int>(i), copy ? same : rng);
+
     if (copy) adopt(first, begin);
   }
 

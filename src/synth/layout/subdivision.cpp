@@ -122,6 +122,7 @@ bool Subdivision::merge(int into, int from) {
                           .norm();
       continue;
     }
+
     if (!after.emplace(edge.first, std::make_pair(edge.second, wall)).second) return false;
   }
   constexpr double kLeastShared = 1.4;  // m: less would leave a gap between two rooms
@@ -130,6 +131,7 @@ bool Subdivision::merge(int into, int from) {
   Cell merged;
   merged.kind = a.kind;
   const int first = after.begin()->first;
+
   for (int at = first; merged.points.empty() || at != first; at = after.at(at).first) {
     merged.points.push_back(at);
     merged.walls.push_back(after.at(at).second);
@@ -138,6 +140,7 @@ bool Subdivision::merge(int into, int from) {
   if (merged.points.size() != after.size()) return false;
   a = std::move(merged);
   b = {};
+
   return true;
 }
 

@@ -54,6 +54,7 @@ static void photograph(Canvas part, std::uint64_t seed) {
     const cv::Point at(static_cast<int>(rng.uniform(0, size.width - w)),
                        static_cast<int>(0.75 * size.height) - h);
     cv::rectangle(part, at, at + cv::Point(w, h), random_color(rng, 0.1, 0.8), -1);
+
     for (int k = 0; k < 6; ++k) {
       const cv::Point p = at + cv::Point(w * (1 + k % 2 * 3) / 6, h * (1 + k / 2 * 2) / 7);
       cv::rectangle(part, p, p + cv::Point(w / 6, h / 8), cv::Scalar::all(rng.uniform(0.02, 0.3)), -1);

@@ -110,6 +110,7 @@ Canvas draw_planks(const Material& m, cv::Size size, std::uint64_t seed) {
                  mix(seed, static_cast<std::uint64_t>(i * 2) + k));
       cv::line(canvas, {ends[k], y0}, {ends[k], y1 - 1}, scalar(tone(m) * 0.25F), 2);
     }
+
     cv::line(canvas, {0, y0}, {size.width, y0}, scalar(tone(m) * 0.25F), 2);
   }
 
@@ -148,6 +149,7 @@ static void add_creases(cv::Mat1f& field, Rng& rng) {
                 static_cast<int>((i / kAcross + rng.uniform()) * field.rows / kDown));
     double angle = rng.uniform(0.0, M_PI);
     const double depth = rng.uniform(0.05, 0.13) * (rng.uniform() < 0.5 ? 1.0 : -1.0);
+
     for (int k = 0; k < 5; ++k) {
       const cv::Point q =
           p + cv::Point(static_cast<int>(7 * std::cos(angle)), static_cast<int>(7 * std::sin(angle)));
@@ -156,6 +158,7 @@ static void add_creases(cv::Mat1f& field, Rng& rng) {
       angle += rng.uniform(-0.5, 0.5);
     }
   }
+
   cv::GaussianBlur(creases, creases, {0, 0}, 1.0);
   field += creases;
 }
@@ -183,6 +186,7 @@ Canvas draw_cloth(const Material& m, cv::Size size, std::uint64_t seed) {
     float at, width, depth;
   };
   std::vector<Fold> folds;
+
   for (int i = 0; i < 16; ++i) {  // spread evenly, as the creases are
     folds.push_back({static_cast<float>((i + rng.uniform()) / 16.0),
                      static_cast<float>(rng.uniform(0.004, 0.018)),

@@ -100,6 +100,7 @@ std::string describe_plan(const Plan& plan, const std::vector<geometry::Rigid3>&
   ordered_json rooms = ordered_json::array(), openings = rooms, things = rooms, robots = rooms;
   for (const PlanRoom& room : plan.rooms) rooms.push_back(describe_room(plan, room));
   for (const PlanOpening& o : plan.openings) openings.push_back(describe_opening(plan, o));
+
   for (const PlanThing& thing : plan.things) {
     things.push_back({{"name", thing.name},
                       {"type", thing.type},
@@ -118,17 +119,20 @@ std::string describe_plan(const Plan& plan, const std::vector<geometry::Rigid3>&
     for (ordered_json& room : rooms) {
       for (ordered_json& face : room["faces"]) face["seen"] = coverage->wall_faces[next++];
     }
+
     for (std::size_t i = 0; i < openings.size(); ++i) openings[i]["jambs_seen"] = coverage->jambs[i];
   }
 
   ordered_json file = {{"kind", plan.kind}, {"layout", plan.number}};
   file["storeys"] = plan.storeys;
   file["alike"] = plan.alike;
+
   if (coverage) file["seen"] = coverage->all;
   file["rooms"] = rooms;
   file["openings"] = openings;
   file["things"] = things;
   file["robots"] = robots;
+
   return core::json_text(file, 1);
 }
 
@@ -138,6 +142,7 @@ std::string describe_changes(const Scene& scene) {
     return {{box.min().x(), box.min().y(), box.min().z()}, {box.max().x(), box.max().y(), box.max().z()}};
   };
   ordered_json changes = ordered_json::array();
+
   for (const SceneChange& c : scene.changes) {
     changes.push_back({{"kind", c.kind}});
     if (c.kind == "light") {
@@ -151,6 +156,7 @@ std::string describe_changes(const Scene& scene) {
                            {"offset_m", {c.offset.x(), c.offset.y(), c.offset.z()}},
                            {"turn_deg", c.turn_rad * 180.0 / M_PI}});
   }
+
   return core::json_text(ordered_json{{"scene", scene.name}, {"changes", changes}}, 1);
 }
 

@@ -162,6 +162,7 @@ core::Result<void> SynthSource::Impl::check_way() const {
   const double end = frames.back().color - kFirstStamp;
   const Vector3d first = at(0.0).translation;
   const Vector3d up = Vector3d(0.0123, 0.0211, 1.0).normalized();
+
   if (const Hit hit = world->cast(first, up, 1e4); hit.face >= 0 && !hit.front) {
     return complain(first, 0.0, hit, "starts inside");
   }
@@ -178,6 +179,7 @@ core::Result<void> SynthSource::Impl::check_way() const {
       const Hit hit = world->cast(here, step / length, length + 0.05);
       if (hit.face >= 0) return complain(to, t, hit, "goes through");
     }
+
     here = to;
   }
 

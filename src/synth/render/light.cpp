@@ -118,6 +118,7 @@ LightMap light_face(const World& world, std::size_t index) {
   const double u0 = bounds.min().x(), v0 = bounds.min().y();
   const double u1 = bounds.max().x(), v1 = bounds.max().y();
   const double w = std::max(u1 - u0, 1e-4), h = std::max(v1 - v0, 1e-4);
+
   const double pitch = std::max(world.scene.light_pitch, std::max(w, h) / 80.0);
 
   LightMap map;
@@ -125,6 +126,7 @@ LightMap light_face(const World& world, std::size_t index) {
   map.rows = 2 + static_cast<int>(h / pitch);
   map.u0 = static_cast<float>(u0);
   map.v0 = static_cast<float>(v0);
+
   map.per_u = static_cast<float>((map.columns - 1) / w);
   map.per_v = static_cast<float>((map.rows - 1) / h);
 

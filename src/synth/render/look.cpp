@@ -198,6 +198,7 @@ View look(const World& world, const sensor::Pinhole& camera, const geometry::Rig
   view.camera = camera;
   view.world_from_camera = world_from_camera;
   const geometry::Rigid3 camera_from_world = world_from_camera.inverse();
+
   EdgeTiles edges(camera, camera_from_world);
   view.faces.reserve(world.scene.faces.size());
 
@@ -211,6 +212,7 @@ View look(const World& world, const sensor::Pinhole& camera, const geometry::Rig
     geometry::Rigid3 camera_from_rest = camera_from_world;
     camera_from_rest.rotation = camera_from_world.rotation * motion.rotation;
     camera_from_rest.translation += camera_from_world.rotation * motion.translation;
+
     for (std::size_t i = mover.first; i < mover.first + mover.count; ++i) {
       view.faces.push_back(view_face(world, i, camera, camera_from_rest));
     }

@@ -46,6 +46,7 @@ std::array<geometry::Rigid3, kParts> part_frames(const FigurePose& pose, bool ca
   const geometry::Rigid3 trunk = upright(pose.hip, pose.yaw);
   out[kTrunk] = trunk;
   double ahead[2];
+
   for (const int side : {0, 1}) {
     const double y = side == 0 ? 1.0 : -1.0;
     const Vector3d joint(0.0, 0.09 * y, 0.0);
@@ -60,6 +61,7 @@ std::array<geometry::Rigid3, kParts> part_frames(const FigurePose& pose, bool ca
     const geometry::Rigid3 thigh(Eigen::Matrix3d(roll * turn(Vector3d::UnitY(), -middle - bend)), joint);
     const geometry::Rigid3 shin(Eigen::Matrix3d(roll * turn(Vector3d::UnitY(), bend - middle)),
                                 thigh * Vector3d(0.0, 0.0, -kLimb));
+
     out[static_cast<std::size_t>(kThigh + side)] = trunk * thigh;
     out[static_cast<std::size_t>(kShin + side)] = trunk * shin;
   }
@@ -71,6 +73,7 @@ std::array<geometry::Rigid3, kParts> part_frames(const FigurePose& pose, bool ca
     out[static_cast<std::size_t>(kArm + side)] =
         trunk * geometry::Rigid3(turn(Vector3d::UnitY(), -swing), Vector3d(0.0, 0.25 * y, 0.5));
   }
+
   return out;
 }
 
@@ -93,6 +96,7 @@ void add_walker(Builder& b, const Walker& walker, int part) {
     const geometry::Rigid3 frame = upright(walker.from, std::atan2(way.y(), way.x()));
     b.box(frame, {-0.15, -0.25, 0.0}, {0.15, 0.25, 1.42}, clothes);
     b.box(frame, {-0.1, -0.09, 1.42}, {0.12, 0.09, 1.7}, skin);
+
     return;
   }
 
@@ -101,6 +105,7 @@ void add_walker(Builder& b, const Walker& walker, int part) {
   if (part == kTrunk) {
     b.box(frame, {-0.11, -0.2, -0.08}, {0.11, 0.2, 0.56}, clothes);
     b.box(frame, {-0.1, -0.08, 0.58}, {0.11, 0.08, 0.86}, skin);
+
     if (walker.carries) b.box(frame, {0.3, -0.2, 0.08}, {0.6, 0.2, 0.34}, {"cardboard"});
   } else if (part < kShin) {
     b.box(frame, {-0.08, -0.075, -kLimb - 0.03}, {0.08, 0.075, 0.05}, trousers);
@@ -149,6 +154,7 @@ MovingFaces::MovingFaces(const World& world, const View& view, double t) : world
     const geometry::Rigid3 motion = world.motion(mover, t);
     const Vector3d eye =
         motion.rotation.transpose() * (view.world_from_camera.translation - motion.translation);
+
     for (std::size_t i = mover.first; i < mover.first + mover.count; ++i) {
       const Face& face = world.scene.faces[i];
       if (face.normal.dot(eye - face.origin) <= 0.0) continue;

@@ -208,6 +208,7 @@ core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const
   if (auto ok = check(options); !ok) return tl::unexpected<core::Error>(ok.error());
   if (scene.faces.empty())
     return core::usage_error(fmt::format("scene '{}' has no surfaces; add `objects:`", scene.name));
+
   if (scene.robots.empty())
     return core::usage_error(fmt::format("scene '{}' has no robots; add `robots:`", scene.name));
 
@@ -224,10 +225,12 @@ core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const
                     "for fewer, or add some to a copy of the scene",
                     scene.name, scene.walkers.size(), options.walkers));
   }
+
   auto world = std::make_shared<World>(std::move(peopled), options);
   if (auto free = check_paths(world); !free) return tl::unexpected<core::Error>(free.error());
   world->prepare_textures();
   world->prepare_light();
+
   return std::shared_ptr<const World>(world);
 }
 

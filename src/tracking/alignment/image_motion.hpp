@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What the camera's motion does to an image that was not taken at one moment.
+// Effect of the camera's motion on an image that was not taken at one moment.
 #include <memory>
 
 #include "plumbline/features/frame_features.hpp"
