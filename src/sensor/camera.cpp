@@ -223,7 +223,7 @@ void read_sigma(const ConfigNode& root, CameraSigma& sigma, ConfigProblems& prob
 std::string sigma_yaml(CameraSigma sigma) {
   std::vector<std::string> told;
   for (const auto& [key, value] : sigma_keys(sigma)) {
-    if (*value > 0.0) told.push_back(fmt::format("{}: {}", key, *value));
+    if (*value > 0.0) told.push_back(fmt::format("{}: {:.3g}", key, *value));
   }
   return told.empty() ? "" : fmt::format("sigma: {{{}}}  # standard deviations\n", fmt::join(told, ", "));
 }

@@ -19,7 +19,7 @@ TEST_F(Calibrate, LeavesACameraThatFitsAlone) {
   const std::string found = slurp(path("found.yaml"));
   EXPECT_NE(found.find("fx: 535.4\n"), std::string::npos) << found;
   EXPECT_NE(found.find("readout: 0 "), std::string::npos) << found;
-  EXPECT_EQ(found.find("depth_slope"), std::string::npos) << found;
+  EXPECT_EQ(found.find("\ndepth_slope"), std::string::npos) << found;
 }
 
 TEST_F(Calibrate, TooLittleToTellIsSaid) {
