@@ -339,7 +339,7 @@ std::optional<CameraEvidence> camera_evidence(CalibrationProblem& problem, const
   add_observations(problem, unknowns, &pixel_loss, &depth_loss, ceres_problem);
   if (!adjust(problem, unknowns, ceres_problem)) return std::nullopt;
 
-  const auto evidence = eliminated(problem, unknowns, ceres_problem);
+  auto evidence = eliminated(problem, unknowns, ceres_problem);
   for (std::size_t i = 0; i < problem.poses.size(); ++i) {
     const Eigen::Map<const Eigen::Matrix<double, kStep, 1>> step(unknowns.step(static_cast<int>(i)));
     geometry::Rigid3& pose = problem.poses[i].camera_from_world;

@@ -217,6 +217,7 @@ cv::Mat1b Ground::reachable(const Vector2d& from) const { return flood(distance_
 bool Ground::try_block(const std::vector<Vector2d>& outline, bool hides_view,
                        const std::vector<Vector2d>& room, const std::vector<Vector2d>& ways, double least) {
   std::vector<cv::Point> corners;
+  corners.reserve(room.size());
   for (const Vector2d& p : room) corners.push_back(cell_of(p));
   const int margin = static_cast<int>(0.8 / kCell);
   const cv::Rect box = cv::boundingRect(corners);

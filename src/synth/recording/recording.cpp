@@ -162,9 +162,9 @@ Result<std::size_t> write_frames(const Job& job, core::Log& log) {
     ok = core::write_file(job.folder / "odometry.csv", describe_odometry(body.odometry));
   if (!ok) return tl::unexpected<core::Error>(ok.error());
 
-  const auto done = job.options.mcap ? write_mcap(job.source, job.folder / "recording.mcap", &body,
-                                                  job.executor, job.stop, job.progress, log)
-                                     : write_pictures(job);
+  auto done = job.options.mcap ? write_mcap(job.source, job.folder / "recording.mcap", &body, job.executor,
+                                            job.stop, job.progress, log)
+                               : write_pictures(job);
   if (!done) return done;
   if (ok = write_truth(job, *done); !ok) return tl::unexpected<core::Error>(ok.error());
   return done;
@@ -370,6 +370,7 @@ Result<void> write_plan(const Scene& scene, const std::vector<std::unique_ptr<Sy
                         const std::optional<PlanCoverage>& coverage, const fs::path& output) {
   if (!scene.plan) return {};
   std::vector<geometry::Rigid3> starts;
+  starts.reserve(sources.size());
   for (const auto& source : sources) starts.push_back(source->world_from_camera(source->info(0).stamp));
   return core::write_file(output / "plan.json", describe_plan(*scene.plan, starts, coverage));
 }

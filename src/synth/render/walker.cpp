@@ -62,15 +62,15 @@ std::array<geometry::Rigid3, kParts> part_frames(const FigurePose& pose, bool ca
     const geometry::Rigid3 shin(Eigen::Matrix3d(roll * turn(Vector3d::UnitY(), bend - middle)),
                                 thigh * Vector3d(0.0, 0.0, -kLimb));
 
-    out[static_cast<std::size_t>(kThigh + side)] = trunk * thigh;
-    out[static_cast<std::size_t>(kShin + side)] = trunk * shin;
+    out[std::size_t{kThigh} + static_cast<std::size_t>(side)] = trunk * thigh;
+    out[std::size_t{kShin} + static_cast<std::size_t>(side)] = trunk * shin;
   }
 
   // Each arm swings like the other side's leg.
   for (const int side : {0, 1}) {
     const double y = side == 0 ? 1.0 : -1.0,
                  swing = carries ? 1.1 : 1.1 * std::clamp(ahead[1 - side], -0.4, 0.4);
-    out[static_cast<std::size_t>(kArm + side)] =
+    out[std::size_t{kArm} + static_cast<std::size_t>(side)] =
         trunk * geometry::Rigid3(turn(Vector3d::UnitY(), -swing), Vector3d(0.0, 0.25 * y, 0.5));
   }
 
