@@ -54,12 +54,11 @@ TrackResult FrameAligner::run() {
 }
 
 void FrameAligner::align_finely() {
-  bool moved = false;
-  for (AlignmentRound round : kFine) {
-    round.rematch = round.rematch || moved;
-    align(round);
-    moved = round.reject_outliers && correct_image_motion();
-  }
+  align(kFine[0]);
+  AlignmentRound next = kFine[1];
+  next.rematch = correct_image_motion();
+  align(next);
+  align(kFine[2]);
 }
 
 void FrameAligner::align(const AlignmentRound& round) {
