@@ -92,9 +92,9 @@ bool RobotCameras::before(std::size_t frame, std::size_t robot, Slams& slams) {
   return true;
 }
 
-bool RobotCameras::may_read_again(std::size_t robot, bool keyframe) {
+bool RobotCameras::may_read_again(std::size_t frame, std::size_t robot, bool keyframe) {
   const bool taken = choices_[robot].takes(keyframe);
-  const bool before = !answered_ || (!waiting_.empty() && waiting_[robot]) || question_ != nullptr;
+  const bool before = !answered_ || question_ != nullptr || frame < use_from_;
   return refine_ && (keyframe || (taken && before));
 }
 
@@ -140,10 +140,11 @@ void RobotCameras::use(std::size_t robot, bool again, std::unique_ptr<mapping::S
 void RobotCameras::estimate_finished(Slams& slams) {
   if (!refine_) return;
   // A live source ended before the answer was used: it is dropped, because for a recording of that length no
-  // estimate would have been made.
-  if (recordings_->live() && !waiting_.empty() && recordings_->size() <= use_from_) {
-    cameras_ = given_;
+  // estimate would have been made before its end.
+  if (recordings_->live() && answered_ && (question_ != nullptr || recordings_->size() <= use_from_)) {
+    if (!waiting_.empty()) cameras_ = given_;
     waiting_.assign(waiting_.size(), false);
+    answered_ = false;
   }
 
   for (std::size_t r = 0; r < slams.size(); ++r) {

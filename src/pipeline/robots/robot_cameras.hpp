@@ -38,7 +38,7 @@ class RobotCameras {
   /// Called after a frame was tracked: starts the estimate from the present maps, beside the tracker, once.
   void after(std::size_t frame, const Slams& slams);
   /// True if the second pass may need the picture of a frame that was tracked; to be called for each.
-  [[nodiscard]] bool may_read_again(std::size_t robot, bool keyframe);
+  [[nodiscard]] bool may_read_again(std::size_t frame, std::size_t robot, bool keyframe);
   /// Estimates from the finished maps, until nothing improves any more.
   void estimate_finished(Slams& slams);
 

@@ -84,7 +84,8 @@ class TrackStage : public Stage {
     tracked->row = rows_.back();
     if (slam.frame_poses().size() > poses) {
       tracked->pose = slam.frame_poses().back();
-      if (cameras_->may_read_again(number, report.keyframe.valid())) recordings().keep(io.frame());
+      if (cameras_->may_read_again(io.frame(), number, report.keyframe.valid()))
+        recordings().keep(io.frame());
     }
 
     if (tracked->pose && tracked->pose->tracked) {
