@@ -88,6 +88,7 @@ bool CameraRefinement::ask(const maps::Map& map, const std::vector<maps::FramePo
     log.debug(fmt::format("{}: {} of {} views: given {:.5g}, found {:.5g} +- {:.2g}, wrong with {:.2f}",
                           robot_.name, f.name, found->views, f.given, f.found, f.sigma, f.wrong));
   report_.note.clear();
+
   const bool knows_less =
       2 * found->views < views_;  // than the question before: a second pass has fewer frames
   views_ = std::max(views_, found->views);
