@@ -33,13 +33,16 @@ bool is_looked_over(const WallLine& side, const WallRaster& raster) {
   return over > kShare * columns;
 }
 
-/// True if a wall that faces the same way runs a little behind the side: a longer one, or two parts of one,
-/// to the left and to the right, of which the side hides the middle.
+/// True if walls that face the same way run a little behind the side: along most of it, so that they were
+/// seen over it; one that is longer; or two parts of one, to the left and to the right, of which the side
+/// hides the middle.
 bool stands_before_wall(const WallLine& side, const std::vector<WallLine>& walls) {
   constexpr double kNearest_m = 0.12;
   constexpr double kFarthest_m = 0.75;
   constexpr double kReach_m = 0.4;
+  constexpr double kSeenBehind = 0.6;  // share of the side
   bool before = false, behind = false;
+  double seen_m = 0.0;
   for (const WallLine& wall : walls) {
     if (wall.normal.dot(side.normal) < 0.998) continue;
     const double s0 = wall.along().dot(side.at(side.s0));
@@ -47,10 +50,11 @@ bool stands_before_wall(const WallLine& side, const std::vector<WallLine>& walls
     const double distance = wall.normal.dot(side.at(0.5 * (side.s0 + side.s1))) - wall.offset_m;
     if (distance < kNearest_m || distance > kFarthest_m) continue;
     if (wall.s0 - kReach_m < s0 && wall.s1 + kReach_m > s1 && wall.length() > side.length()) return true;
+    seen_m += std::max(0.0, std::min(wall.s1, s1) - std::max(wall.s0, s0));
     before = before || (wall.s0 < s0 && wall.s1 > s0 - kReach_m);
     behind = behind || (wall.s1 > s1 && wall.s0 < s1 + kReach_m);
   }
-  return before && behind;
+  return (before && behind) || seen_m > kSeenBehind * side.length();
 }
 
 /// Keeps the sides for which keep(number) is true.

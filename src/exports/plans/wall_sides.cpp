@@ -75,7 +75,7 @@ double wall_height(const evaluate::SurfaceSamples& samples) {
 /// The line on which most points lie: the most frequent distance, then least squares near it.
 void fit_line(const std::vector<Eigen::Vector2d>& places, WallLine& line) {
   constexpr double kBin_m = 0.001;
-  constexpr std::array<double, 5> kNear_m{0.03, 0.015, 0.008, 0.008, 0.008};
+  constexpr std::array<double, 5> kNear_m{0.03, 0.015, 0.008, 0.005, 0.005};
   constexpr int kBins = 2 * static_cast<int>(kWallSlab_m / kBin_m) + 1;
   std::array<int, kBins> bins{};
   for (const Eigen::Vector2d& p : places) {

@@ -80,7 +80,8 @@ class Case:
         recording = recording_of(name)
         with open(self.work / "lock", "w") as lock:  # cases may run side by side
             fcntl.flock(lock, fcntl.LOCK_EX)
-            if not (self.map / "summary.json").is_file():
+            made = self.map / "summary.json"
+            if not made.is_file() or made.stat().st_mtime < Path(program).stat().st_mtime:  # by an older program
                 shutil.rmtree(self.map, ignore_errors=True)
                 run(program, "map", recording, "-o", self.map, "-q")
 
