@@ -19,8 +19,8 @@ struct Moment {
   std::size_t frames;  ///< that are stored, at least
 };
 constexpr Moment kMoments[] = {{Known::kNothing, 8},    {Known::kNothing, 20}, {Known::kNothing, 35},
-                               {Known::kAsked, 0},      {Known::kAsked, 62},   {Known::kAnswered, 0},
-                               {Known::kAnswered, 150}, {Known::kUsed, 0},     {Known::kUsed, 218}};
+                               {Known::kAsked, 0},      {Known::kAsked, 72},   {Known::kAnswered, 0},
+                               {Known::kAnswered, 150}, {Known::kUsed, 0},     {Known::kUsed, 228}};
 
 class CameraResume : public ProgramTest {
  protected:
@@ -74,8 +74,8 @@ class CameraResume : public ProgramTest {
 };
 
 TEST_F(CameraResume, ARunThatIsKilledAsksAndUsesItsCameraAsTheUndisturbedOne) {
-  ASSERT_EQ(run("synth room -o world --width 320 --height 240 --frames 230 --fps 5 --seed 3 "
-                "--reference-spacing 20cm --camera-error fx=2% -q")
+  ASSERT_EQ(run("synth home --layout 7 -o world --width 320 --height 240 --frames 240 --fps 6 --seed 3 "
+                "--path tour --reference-spacing 50cm --camera-error fx=2% -q")
                 .code,
             0);
   const std::string map = "world/robot0 -q --set output.views= --set output.pcd=off --set fuse.voxel=40mm";
