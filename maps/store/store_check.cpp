@@ -126,6 +126,15 @@ void check(const MapRow& row) {
   for (const LoopEdge& loop : row.loops) check_edge(loop);
 }
 
+void check(const CameraEstimate& estimate) {
+  check(estimate.found);
+  demand(estimate.asked_at >= -1 && estimate.used_from >= 0, "a camera's estimate is out of range");
+  const bool finite = estimate.covariance.allFinite() && std::isfinite(estimate.gain);
+  demand(finite && estimate.covariance.diagonal().minCoeff() >= 0.0, "a camera's covariance is none");
+  for (const double wrong : estimate.wrong)
+    demand(wrong >= 0.0 && wrong <= 1.0, "a camera's estimate is out of range");
+}
+
 void check_header(const std::string& key, const Bytes& bytes, std::vector<RobotInfo>& robots) {
   const auto plain = [&](std::size_t most) { return unpack(bytes.data(), bytes.size(), most); };
   if (key == "robots") {
@@ -144,6 +153,9 @@ void check_header(const std::string& key, const Bytes& bytes, std::vector<RobotI
         demand(version.first_keyframe >= 0 && version.first_frame >= 0, "a camera's version is out of range");
       }
     }
+
+  } else if (key == "estimates") {
+    for (const auto& estimate : decode<CameraEstimates>(plain(kMostSmall))) check(estimate.second);
 
   } else if (key == "result") {
     check(decode<ResultFrame>(plain(kMostSmall)).output_from_map);

@@ -4,6 +4,7 @@
 // Parts of a map as bytes (docs/reference/store.md), before packing: `fields` of each type is the format.
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "plumbline/maps/frame_pose.hpp"
@@ -74,8 +75,16 @@ void fields(Io& io, CameraVersions& versions) {
 }
 
 template <typename Io>
+void fields(Io& io, CameraEstimate& e) {
+  io(e.asked_at, e.used_from, e.answers, e.views, e.better, e.gain, e.note, e.doubt, e.found, e.covariance,
+     e.wrong);
+}
+using CameraEstimates = std::vector<std::pair<std::int32_t, CameraEstimate>>;  ///< with the robots' numbers
+
+template <typename Io>
 void fields(Io& io, RobotInfo& robot) {
-  io(robot.number, robot.name, robot.camera);  // versions have a row of their own, that comes later
+  io(robot.number, robot.name,
+     robot.camera);  // versions and estimates have rows of their own, that come later
 }
 
 template <typename Io>

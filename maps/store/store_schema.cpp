@@ -65,6 +65,7 @@ void put_header(Database& database, const StoreHeader& header) {
   put_header(database, kFirst, "program", header.program_version);
   put_header(database, kFirst, "configuration", header.configuration);
   put_robots(database, kFirst, header.robots);
+  put_camera_estimates(database, kFirst, header.robots);
   put_complete(database, kFirst, false);
 }
 
@@ -77,6 +78,20 @@ void put_camera_versions(Database& database, std::int64_t transaction, const std
   versions.reserve(robots.size());
   for (const RobotInfo& robot : robots) versions.push_back({robot.number, robot.versions});
   put_header(database, transaction, "cameras", pack(encoded(versions)));
+}
+
+CameraEstimates estimates_of(const std::vector<RobotInfo>& robots) {
+  CameraEstimates estimates;
+  for (const RobotInfo& robot : robots) {
+    if (robot.estimate) estimates.emplace_back(robot.number, *robot.estimate);
+  }
+  return estimates;
+}
+
+void put_camera_estimates(Database& database, std::int64_t transaction,
+                          const std::vector<RobotInfo>& robots) {
+  const CameraEstimates estimates = estimates_of(robots);
+  if (!estimates.empty()) put_header(database, transaction, "estimates", pack(encoded(estimates)));
 }
 
 void put_complete(Database& database, std::int64_t transaction, bool complete) {
@@ -138,12 +153,21 @@ StoreHeader read_header(Database& database) {
   Statement robots(database, "SELECT data FROM header WHERE key = 'robots'");
   if (!robots.step()) throw BadBytes("its header has no robots");
   header.robots = decode<std::vector<RobotInfo>>(robots.unpacked(0));
-  Statement cameras(database, "SELECT data FROM header WHERE key = 'cameras'");
-  if (!cameras.step()) return header;
-  for (const CameraVersions& of : decode<std::vector<CameraVersions>>(cameras.unpacked(0))) {
+  const auto each = [&header](std::int32_t number, const auto& set) {
     for (RobotInfo& robot : header.robots) {
-      if (robot.number == of.robot) robot.versions = of.versions;
+      if (robot.number == number) set(robot);
     }
+  };
+
+  Statement cameras(database, "SELECT data FROM header WHERE key = 'cameras'");
+  if (cameras.step()) {
+    for (const CameraVersions& of : decode<std::vector<CameraVersions>>(cameras.unpacked(0)))
+      each(of.robot, [&of](RobotInfo& robot) { robot.versions = of.versions; });
+  }
+  Statement estimates(database, "SELECT data FROM header WHERE key = 'estimates'");
+  if (estimates.step()) {
+    for (const auto& of : decode<CameraEstimates>(estimates.unpacked(0)))
+      each(of.first, [&of](RobotInfo& robot) { robot.estimate = of.second; });
   }
   return header;
 }

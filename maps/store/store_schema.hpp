@@ -52,6 +52,9 @@ StoreHeader read_header(Database& database);
 void put_robots(Database& database, std::int64_t transaction, const std::vector<RobotInfo>& robots);
 /// Stores the robots' refined cameras.
 void put_camera_versions(Database& database, std::int64_t transaction, const std::vector<RobotInfo>& robots);
+/// Stores what is known of the robots' cameras; no row without robots of which something is.
+void put_camera_estimates(Database& database, std::int64_t transaction, const std::vector<RobotInfo>& robots);
+CameraEstimates estimates_of(const std::vector<RobotInfo>& robots);
 void put_complete(Database& database, std::int64_t transaction, bool complete);
 void put_result_frame(Database& database, std::int64_t transaction, const ResultFrame& frame);
 /// The map's own frame if none was stored.

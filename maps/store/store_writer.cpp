@@ -173,6 +173,8 @@ void StoreWriter::Impl::put_robots_of_map(const std::vector<RobotInfo>& all) {
   recomputed = versions(all) != versions(robots);
   if (recomputed) put_camera_versions(*database, transaction, all);
   if (encoded(all) != encoded(robots)) put_robots(*database, transaction, all);
+  if (encoded(estimates_of(all)) != encoded(estimates_of(robots)))
+    put_camera_estimates(*database, transaction, all);
   robots = all;
 }
 

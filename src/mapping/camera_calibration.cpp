@@ -240,22 +240,6 @@ sensor::CameraSigma sigma_of(const optimize::CameraPosterior& known, const senso
           sigma[optimize::kDelay]};
 }
 
-/// Knowledge of each number, in the order of numbers_of().
-std::vector<CameraFinding> findings_of(const sensor::Camera& file, const sensor::Camera& camera,
-                                       const optimize::CameraPosterior& known) {
-  std::vector<CameraFinding> findings;
-  const std::vector<CameraNumber> found = numbers_of(camera);
-  for (const CameraNumber& n : numbers_of(file)) {
-    const auto u = static_cast<Eigen::Index>(n.unknown);
-    CameraFinding f{n.name, n.value, found[findings.size()].value};
-    f.sigma = (n.unknown == optimize::kFocal ? n.value : 1.0) * std::sqrt(known.covariance(u, u));
-    f.wrong = known.wrong[optimize::group_of(n.unknown)];
-    f.used = std::abs(f.found - f.given) > f.sigma;
-    findings.push_back(f);
-  }
-  return findings;
-}
-
 /// Evidence of each part; none if some part has none.
 std::optional<std::vector<CameraEvidence>> evidence_of(Parts& parts, const CameraChange& change,
                                                        const core::Executor& executor) {
@@ -318,17 +302,23 @@ core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRu
 
   result.camera = optimize::changed_camera(given, change);
   result.sigma = sigma_of(known, result.camera);
+  result.known = known;
   result.findings = findings_of(options.file.value_or(given), result.camera, known);
   result.news = (change - none).cwiseAbs().cwiseQuotient(known.covariance.diagonal().cwiseSqrt()).maxCoeff();
   return result;
 }
 
-std::vector<CameraFinding> findings_between(const sensor::Camera& given, const sensor::Camera& found) {
+std::vector<CameraFinding> findings_of(const sensor::Camera& file, const sensor::Camera& found,
+                                       const optimize::CameraPosterior& known) {
   std::vector<CameraFinding> findings;
-  const std::vector<CameraNumber> after = numbers_of(found);
-  for (const CameraNumber& n : numbers_of(given)) {
-    const double value = after[findings.size()].value;
-    findings.push_back({n.name, n.value, value, 0.0, value != n.value ? 1.0 : 0.0, value != n.value});
+  const std::vector<CameraNumber> numbers = numbers_of(found);
+  for (const CameraNumber& n : numbers_of(file)) {
+    const auto u = static_cast<Eigen::Index>(n.unknown);
+    CameraFinding f{n.name, n.value, numbers[findings.size()].value};
+    f.sigma = (n.unknown == optimize::kFocal ? n.value : 1.0) * std::sqrt(known.covariance(u, u));
+    f.wrong = known.wrong[optimize::group_of(n.unknown)];
+    f.used = std::abs(f.found - f.given) > f.sigma;
+    findings.push_back(f);
   }
   return findings;
 }

@@ -60,7 +60,8 @@ constexpr double kFileIsWrong = 2.5;
 
 struct CameraCalibration {
   sensor::Camera camera;
-  sensor::CameraSigma sigma;  ///< its standard deviations
+  sensor::CameraSigma sigma;        ///< its standard deviations
+  optimize::CameraPosterior known;  ///< `camera` as a change of the one that the maps were made with
   std::vector<CameraFinding> findings;
   int views = 0;
   int observations = 0;
@@ -76,8 +77,8 @@ core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRu
                                                  const CalibrationOptions& options,
                                                  const core::Executor& executor);
 
-/// Differences of `found` from `given`; marked as used where they differ. Standard deviations and gains are
-/// not known.
-std::vector<CameraFinding> findings_between(const sensor::Camera& given, const sensor::Camera& found);
+/// Knowledge of each number of `found`, given its file. The mean of `known` does not matter.
+std::vector<CameraFinding> findings_of(const sensor::Camera& file, const sensor::Camera& found,
+                                       const optimize::CameraPosterior& known);
 
 }  // namespace plumbline::mapping

@@ -4,6 +4,8 @@
 // The map store, map.db: an SQLite file that holds a map exactly, written as the run goes
 // (docs/reference/store.md). A process that is killed leaves a file that opens and holds every keyframe that
 // was added.
+#include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -30,6 +32,22 @@ struct CameraVersion {
   std::int32_t first_frame = 0;     ///< frames of the robot's path, likewise
 };
 
+/// Knowledge of a robot's camera in a run: when it was asked for, and its posterior.
+struct CameraEstimate {
+  std::int64_t asked_at = -1;  ///< frame of the run whose maps it is estimated from while mapping; -1: none
+  std::int64_t used_from = 0;  ///< frame of the run from which `found` is used; 0: the first, or it is not
+  std::int32_t answers = 0;    ///< number of estimates that have ended
+  std::int32_t views = 0;      ///< most views of one of them
+  bool better = false;         ///< `found` replaces the file's
+  double gain = 0.0;           ///< improvement of the fit, share
+  std::string note;            ///< why there is no estimate; empty: there is one
+  std::string doubt;           ///< why the camera must not be trusted; empty: it may be
+  sensor::Camera found;
+  /// Covariance of changes of `found`, in the order of optimize::CameraUnknown.
+  Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
+  std::array<double, 6> wrong{};  ///< probability that the file is, 0 to 1, by optimize::CameraGroup
+};
+
 /// A robot of a map. All images are rectified to the pinhole of `camera`, also after refinement. Keyframes
 /// and landmarks are those of the latest version; clouds and their surfaces are stored as they were read, and
 /// CameraHistory converts them to the latest version.
@@ -38,6 +56,7 @@ struct RobotInfo {
   std::string name;
   sensor::Camera camera;                     ///< the given one
   std::vector<CameraVersion> versions = {};  ///< refined versions in order; empty: none
+  std::optional<CameraEstimate> estimate = {};
 };
 
 /// Header of a store, written once when it is made.
@@ -115,8 +134,8 @@ struct StoreStep {
   std::vector<std::string> log;           ///< lines that came since
   std::vector<StoreCloud> clouds;
   std::vector<StorePicture> pictures = {};
-  /// All robots, if the camera of one was replaced: keyframes and edges of `map`, which is whole in that
-  /// case, were recomputed. Null: no camera changed.
+  /// All robots, if there are news of a camera. If that of one was replaced, keyframes and edges of `map`,
+  /// which is whole in that case, were recomputed. Null: no news.
   std::shared_ptr<const std::vector<RobotInfo>> robots = nullptr;
 };
 

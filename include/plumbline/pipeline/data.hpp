@@ -49,7 +49,7 @@ struct TrackedFrame {
   /// Changes of the map since the last keyframe; with each keyframe, if some stage keeps the map.
   std::shared_ptr<const maps::MapChanges> changes;
   std::shared_ptr<const maps::Map> map;  ///< for several robots: the map at this keyframe
-  /// With a keyframe: all robots, if the robot's camera was replaced since the last one. Null: it was not.
+  /// With a keyframe: all robots, if there are news of a camera since the last one. Null: there are none.
   std::shared_ptr<const std::vector<RobotInfo>> robots;
 };
 

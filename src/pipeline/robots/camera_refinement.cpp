@@ -3,7 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <system_error>
 
 #include "plumbline/core/output_file.hpp"
@@ -43,11 +45,60 @@ std::string doubt_of(const core::Result<mapping::CameraCalibration>& found) {
                      kGuessedFocalSigma * fx->given);
 }
 
+/// The findings of an estimate, relative to the camera's file; none before the first one.
+std::vector<mapping::CameraFinding> findings_of(const sensor::Camera& file,
+                                                const maps::CameraEstimate& known) {
+  if (known.views == 0 && !known.better) return {};
+  optimize::CameraPosterior posterior;
+  posterior.covariance = known.covariance;
+  posterior.wrong = known.wrong;
+  auto findings = mapping::findings_of(file, known.found, posterior);
+  for (mapping::CameraFinding& f : findings) f.used = f.used && known.better;
+  return findings;
+}
+
+bool is_known(const RobotInfo& robot) {
+  return robot.estimate && robot.estimate->covariance.diagonal().minCoeff() > 0.0;
+}
+
+/// Two cameras are the same one unless the chance of such a difference is below 1 %.
+Json pair_of(const RobotInfo& a, const RobotInfo& b) {
+  constexpr std::array<const char*, optimize::kCameraUnknowns> kNames{
+      "fx", "readout", "depth_slope x", "depth_slope y", "cx", "cy", "k1", "k2", "depth_delay"};
+  constexpr double kMostChi2 = 21.67;  // of nine numbers
+  const sensor::Pinhole &size_a = a.camera.color, &size_b = b.camera.color;
+  Json pair{{"a", a.name}, {"b", b.name}};
+  if (size_a.width != size_b.width || size_a.height != size_b.height || a.camera.model != b.camera.model) {
+    pair.update({{"agree", false}, {"chi2", nullptr}, {"sigmas", nullptr}, {"number", nullptr}});
+    pair["text"] = fmt::format("robots {} and {}: cameras differ in size or lens", a.name, b.name);
+    return pair;
+  }
+
+  optimize::CameraChange difference = optimize::change_between(a.estimate->found, b.estimate->found);
+  difference[optimize::kReadout] -= a.estimate->found.readout_s.value_or(0.0);
+  const optimize::CameraCovariance both = a.estimate->covariance + b.estimate->covariance;
+  const optimize::CameraChange sigma = both.diagonal().cwiseSqrt();
+  const optimize::CameraChange sigmas = difference.cwiseQuotient(sigma);
+  const optimize::CameraCovariance correlation =
+      sigma.cwiseInverse().asDiagonal() * both * sigma.cwiseInverse().asDiagonal();
+  const double chi2 = sigmas.dot(correlation.ldlt().solve(sigmas));
+
+  Eigen::Index number = 0;
+  const double largest = sigmas.cwiseAbs().maxCoeff(&number);
+  const char* name = kNames.at(static_cast<std::size_t>(number));
+  const bool agree = chi2 <= kMostChi2;
+  pair.update({{"agree", agree}, {"chi2", rounded(chi2)}, {"sigmas", rounded(largest)}, {"number", name}});
+  pair["text"] = fmt::format("robots {} and {}: cameras {} by {:.1f} sigma in {}", a.name, b.name,
+                             agree ? "agree, they differ" : "differ", largest, name);
+  return pair;
+}
+
 }  // namespace
 
-Json section_of(const CameraReport& camera) {
+Json camera_section(const RobotInfo& robot) {
+  const maps::CameraEstimate known = robot.estimate.value_or(maps::CameraEstimate());
   Json numbers = Json::array();
-  for (const mapping::CameraFinding& f : camera.findings) {
+  for (const mapping::CameraFinding& f : findings_of(robot.camera, known)) {
     numbers.push_back({{"name", f.name},
                        {"given", f.given},
                        {"found", f.found},
@@ -55,14 +106,27 @@ Json section_of(const CameraReport& camera) {
                        {"wrong", rounded(f.wrong)},
                        {"used", f.used}});
   }
-  return {{"robot", camera.robot}, {"gain", rounded(camera.gain)},    {"numbers", numbers},
-          {"asked", camera.asked}, {"from_frame", camera.from_frame}, {"note", camera.note},
-          {"doubt", camera.doubt}};
+  return {{"robot", robot.name},
+          {"gain", rounded(known.gain)},
+          {"numbers", numbers},
+          {"asked", known.answers},
+          {"asked_at", known.asked_at < 0 ? Json(nullptr) : Json(known.asked_at)},
+          {"from_frame", known.used_from},
+          {"note", known.note},
+          {"doubt", known.doubt}};
 }
 
-CameraRefinement::CameraRefinement(const RobotInfo& robot) : robot_(robot), camera_(robot.camera) {
-  report_.robot = robot.name;
+Json camera_pairs(const std::vector<RobotInfo>& robots) {
+  Json pairs = Json::array();
+  for (std::size_t i = 0; i < robots.size(); ++i) {
+    for (std::size_t j = i + 1; j < robots.size(); ++j) {
+      if (is_known(robots[i]) && is_known(robots[j])) pairs.push_back(pair_of(robots[i], robots[j]));
+    }
+  }
+  return pairs;
 }
+
+CameraRefinement::CameraRefinement(const RobotInfo& robot) : robot_(robot) { known_.found = robot.camera; }
 
 bool CameraRefinement::ask(const maps::Map& map, const std::vector<maps::FramePose>& frames,
                            const core::Executor& executor, core::Log& log) {
@@ -74,12 +138,12 @@ bool CameraRefinement::ask(const maps::Map& map, const std::vector<maps::FramePo
   }
 
   const auto found =
-      mapping::calibrate_camera({{&map, &frames, robot_.camera.color}}, camera_, options, executor);
-  ++report_.asked;
-  if (robot_.camera.guess) report_.doubt = doubt_of(found);
+      mapping::calibrate_camera({{&map, &frames, robot_.camera.color}}, camera(), options, executor);
+  ++known_.answers;
+  if (robot_.camera.guess) known_.doubt = doubt_of(found);
 
   if (!found) {
-    if (report_.asked == 1) report_.note = found.error().message;
+    if (known_.answers == 1) known_.note = found.error().message;
     log.debug(fmt::format("{}: the camera is as given: {}", robot_.name, found.error().message));
     return false;
   }
@@ -87,34 +151,36 @@ bool CameraRefinement::ask(const maps::Map& map, const std::vector<maps::FramePo
   for (const mapping::CameraFinding& f : found->findings)
     log.debug(fmt::format("{}: {} of {} views: given {:.5g}, found {:.5g} +- {:.2g}, wrong with {:.2f}",
                           robot_.name, f.name, found->views, f.given, f.found, f.sigma, f.wrong));
-  report_.note.clear();
+  known_.note.clear();
 
   const bool knows_less =
-      2 * found->views < views_;  // than the question before: a second pass has fewer frames
-  views_ = std::max(views_, found->views);
-  const bool better = !knows_less && found->news >= (changed_ ? kLaterNews : mapping::kFileIsWrong);
-  if (report_.asked > 1 && !better) return false;
-  report_.findings = found->findings;
-  report_.gain = found->gain;
-  if (!better) {
-    for (mapping::CameraFinding& f : report_.findings) f.used = false;
-    return false;
-  }
+      2 * found->views < known_.views;  // than the question before: a second pass has fewer frames
+  known_.views = std::max(known_.views, found->views);
+  const bool better = !knows_less && found->news >= (known_.better ? kLaterNews : mapping::kFileIsWrong);
+  if (known_.answers > 1 && !better) return false;
+  known_.better = better;
+  known_.found = found->camera;
+  known_.covariance = found->known.covariance;
+  known_.wrong = found->known.wrong;
+  known_.gain = found->gain;
+  if (!better) return false;
 
-  changed_ = true;
-  camera_ = found->camera;
-  camera_.guess = false;
+  known_.found.guess = false;
   log.info(fmt::format("{}: the camera is better with {}: the recording fits {:.1f} % better", robot_.name,
-                       found_text(report_.findings), 100.0 * report_.gain));
+                       found_text(found->findings), 100.0 * known_.gain));
   return true;
 }
 
-void CameraRefinement::restore(const sensor::Camera& camera, std::size_t from_frame) {
-  camera_ = camera;
-  changed_ = true;
-  report_.findings = mapping::findings_between(robot_.camera, camera);
-  report_.from_frame = from_frame;
-  report_.note = "found before the run was interrupted";
+void CameraRefinement::restore(const RobotInfo& stored) {
+  if (stored.estimate) {
+    known_ = *stored.estimate;
+  } else if (!stored.versions.empty()) {  // by a program that did not store estimates
+    known_.found = stored.versions.back().camera;
+    known_.better = true;
+    known_.used_from = stored.versions.back().first_frame;
+    known_.note = "found before the run was interrupted";
+  }
+  known_.found.sigma = robot_.camera.sigma;  // is not stored
 }
 
 core::Result<void> write_cameras(const std::filesystem::path& folder, const std::vector<RobotInfo>& robots,

@@ -16,17 +16,11 @@
 
 namespace plumbline::pipeline {
 
-/// Result of estimating a robot's camera from its own map.
-struct CameraReport {
-  std::string robot;
-  std::vector<mapping::CameraFinding> findings;
-  double gain = 0.0;  ///< improvement of the fit on parts of the map that it was not estimated from, share
-  std::string note;   ///< why the camera was not estimated; empty: it was
-  std::string doubt;  ///< reason not to trust the camera; empty: there is none
-  int asked = 0;      ///< number of estimates; the second is of a map made with the result of the first
-  std::size_t from_frame = 0;  ///< first frame for which the result is used; 0: all
-};
-Json section_of(const CameraReport& camera);
+/// The estimate of a robot's camera in summary.json.
+Json camera_section(const RobotInfo& robot);
+/// Pairs of robots whose cameras were estimated, each with whether these may be one: the difference of all
+/// numbers against both covariances.
+Json camera_pairs(const std::vector<RobotInfo>& robots);
 
 /// One robot's camera.
 class CameraRefinement {
@@ -38,20 +32,19 @@ class CameraRefinement {
   bool ask(const maps::Map& map, const std::vector<maps::FramePose>& frames, const core::Executor& executor,
            core::Log& log);
 
-  [[nodiscard]] const sensor::Camera& camera() const { return camera_; }
-  /// Findings of all estimates so far, relative to the camera that was given.
-  [[nodiscard]] const CameraReport& report() const { return report_; }
+  [[nodiscard]] const sensor::Camera& camera() const { return known_.better ? known_.found : robot_.camera; }
+  /// Result of all estimates so far, relative to the camera that was given.
+  [[nodiscard]] const maps::CameraEstimate& known() const { return known_; }
+  /// Sets the frame of the run after which the estimate begins; -1: there was none.
+  void asked_at(std::int64_t frame) { known_.asked_at = frame; }
   /// Sets the frame of the run from which camera() is used; 0: from the first one on.
-  void used_from(std::size_t frame) { report_.from_frame = frame; }
-  /// Takes over the camera that the interrupted run had found.
-  void restore(const sensor::Camera& camera, std::size_t from_frame);
+  void used_from(std::size_t frame) { known_.used_from = static_cast<std::int64_t>(frame); }
+  /// Takes over what the interrupted run knew.
+  void restore(const RobotInfo& stored);
 
  private:
   RobotInfo robot_;
-  sensor::Camera camera_;
-  int views_ = 0;         ///< most views of a question so far
-  bool changed_ = false;  ///< it is not the file's any more
-  CameraReport report_;
+  maps::CameraEstimate known_;
 };
 
 /// Writes OUT/camera.yaml, or for several robots OUT/robots/NAME/camera.yaml. `cameras`: by robot.

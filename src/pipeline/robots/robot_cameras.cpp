@@ -59,10 +59,16 @@ void RobotCameras::after(std::size_t frame, const Slams& slams) {
   if (ends_before && !recordings_->live()) return;
 
   answered_ = true;
+  for (CameraRefinement& camera : cameras_) camera.asked_at(static_cast<std::int64_t>(frame));
+  tell();
+  ask(frame, slams);
+}
+
+void RobotCameras::ask(std::size_t asked_at, const Slams& slams) {
   question_ = std::make_unique<Question>();
   question_->cameras = cameras_;
   question_->better.resize(cameras_.size());
-  question_->due = frame + kAnswerFrames;
+  question_->due = asked_at + kAnswerFrames;
   std::vector<std::pair<maps::Map, std::vector<maps::FramePose>>> maps;
   for (const auto& slam : slams) maps.emplace_back(slam->map(), slam->frame_poses());
   question_->job = executor_->submit([question = question_.get(), maps = std::move(maps), log = log_] {
@@ -82,9 +88,20 @@ void RobotCameras::take_answer(std::size_t frame) {
   for (std::size_t r = 0; r < cameras_.size(); ++r) {
     if (waiting_[r]) cameras_[r].used_from(use_from_);
   }
+  tell();
+}
+
+void RobotCameras::tell() {
+  if (!refine_) return;
+  for (std::size_t r = 0; r < cameras_.size(); ++r) robots_[r].estimate = cameras_[r].known();
+  ++news_;
 }
 
 bool RobotCameras::before(std::size_t frame, std::size_t robot, Slams& slams) {
+  if (ask_again_ && frame > *ask_again_) {
+    ask(*ask_again_, slams);
+    ask_again_.reset();
+  }
   if (question_ != nullptr && frame >= question_->due) take_answer(frame);
   if (waiting_.empty() || !waiting_[robot] || frame < use_from_) return false;
   waiting_[robot] = false;
@@ -143,6 +160,7 @@ void RobotCameras::estimate_finished(Slams& slams) {
   // estimate would have been made before its end.
   if (recordings_->live() && answered_ && (question_ != nullptr || recordings_->size() <= use_from_)) {
     if (!waiting_.empty()) cameras_ = given_;
+    for (CameraRefinement& camera : cameras_) camera.asked_at(-1);
     waiting_.assign(waiting_.size(), false);
     answered_ = false;
   }
@@ -156,29 +174,44 @@ void RobotCameras::estimate_finished(Slams& slams) {
       use(r, !answered_ && i == 0, slam);
     }
   }
+  tell();
+  for (const Json& pair : camera_pairs(robots_)) log_->info(pair.at("text").get<std::string>());
 }
 
-void RobotCameras::restore(const RobotInfo& stored, mapping::Slam& slam) {
-  if (stored.versions.empty()) return;
-  const auto number = static_cast<std::size_t>(stored.number);
-  asked_ = true;
-  robots_.at(number).versions = stored.versions;
-  const maps::CameraVersion& newest = stored.versions.back();
-  cameras_[number].restore(newest.camera, static_cast<std::size_t>(newest.first_frame));
-  slam.set_camera(cameras_[number].camera());
-}
+void RobotCameras::resume(const std::vector<RobotInfo>& robots, Slams& slams) {
+  given_ = cameras_;
+  std::vector<bool> waiting(cameras_.size());
+  for (const RobotInfo& stored : robots) {
+    const auto number = static_cast<std::size_t>(stored.number);
+    CameraRefinement& camera = cameras_.at(number);
+    camera.restore(stored);
+    robots_[number].versions = stored.versions;
+    if (!stored.versions.empty()) slams.at(number)->set_camera(camera.camera());
 
-void RobotCameras::resume() {
-  if (asked_ && refine_) recordings_->correct(0, now());
+    // A question without answer is asked again; an answer that was not used waits for its frame.
+    const maps::CameraEstimate& known = camera.known();
+    answered_ = answered_ || known.asked_at >= 0;
+    asked_ = asked_ || answered_ || known.better;
+    if (known.asked_at >= 0 && known.answers == 0) ask_again_ = static_cast<std::size_t>(known.asked_at);
+    use_from_ = std::max(use_from_, static_cast<std::size_t>(known.used_from));
+    waiting[number] = known.better && stored.versions.empty();
+  }
+
+  tell();
+  if (answered_ && !ask_again_) waiting_ = std::move(waiting);
+  const auto better = [](const CameraRefinement& camera) { return camera.known().better; };
+  if (refine_ && std::any_of(cameras_.begin(), cameras_.end(), better))
+    recordings_->correct(use_from_, now());
 }
 
 Json RobotCameras::section() const {
   Json list = Json::array();
   for (std::size_t r = 0; r < cameras_.size(); ++r) {
     if (!refine_ && !robots_[r].camera.guess) continue;
-    CameraReport report = cameras_[r].report();
-    if (!refine_) report.doubt = "no camera file was given: the camera is a guess";
-    list.push_back(section_of(report));
+    RobotInfo robot = robots_[r];
+    robot.estimate = cameras_[r].known();
+    if (!refine_) robot.estimate->doubt = "no camera file was given: the camera is a guess";
+    list.push_back(camera_section(robot));
   }
   return list;
 }

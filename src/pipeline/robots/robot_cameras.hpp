@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "plumbline/core/executor.hpp"
@@ -27,7 +28,7 @@ class RobotCameras {
   using BeginSlam = std::function<std::unique_ptr<mapping::Slam>(const RobotInfo&)>;
   RobotCameras(RobotRecordings& recordings, bool refine, BeginSlam begin, const RunContext& context);
 
-  /// The robots, with all refined versions of their cameras.
+  /// The robots, with all refined versions of their cameras and what is known of these.
   [[nodiscard]] const std::vector<RobotInfo>& robots() const { return robots_; }
   /// Each camera as far as it is known now.
   [[nodiscard]] std::vector<sensor::Camera> now() const;
@@ -42,9 +43,10 @@ class RobotCameras {
   /// Estimates from the finished maps, until nothing improves any more.
   void estimate_finished(Slams& slams);
 
-  /// Takes over a robot's camera from an interrupted run; resume() follows.
-  void restore(const RobotInfo& stored, mapping::Slam& slam);
-  void resume();
+  /// Goes on where an interrupted run stopped; `robots`: as stored. The maps are restored after that.
+  void resume(const std::vector<RobotInfo>& robots, Slams& slams);
+  /// Grows with everything that is learnt of a camera.
+  [[nodiscard]] int news() const { return news_; }
 
   [[nodiscard]] Json section() const;
   void doubt(std::vector<Doubt>& reasons) const;
@@ -58,7 +60,11 @@ class RobotCameras {
     core::Executor::Job job;                ///< last: its destructor waits for it
   };
   [[nodiscard]] bool knows_enough(std::size_t frame, const Slams& slams) const;
+  /// Starts the estimate that belongs after that frame.
+  void ask(std::size_t asked_at, const Slams& slams);
   void take_answer(std::size_t frame);
+  /// Notes in robots() what is known.
+  void tell();
   /// Makes the robot's map anew for its camera as it is known now: the recording is mapped again if it is
   /// `again`, and can be, else the map is rebuilt.
   void use(std::size_t robot, bool again, std::unique_ptr<mapping::Slam>& slam);
@@ -75,8 +81,10 @@ class RobotCameras {
   std::vector<RobotInfo> robots_;
   std::vector<CameraRefinement> cameras_;  ///< by robot
   std::vector<CameraRefinement> given_;    ///< cameras before the estimate
+  std::optional<std::size_t> ask_again_;   ///< frame after which the interrupted run asked, unanswered
   std::unique_ptr<Question> question_;     ///< estimate in progress; null: none
-  std::size_t use_from_ = 0;               ///< frame from which the answer is used
+  int news_ = 0;
+  std::size_t use_from_ = 0;   ///< frame from which the answer is used
   std::vector<bool> waiting_;  ///< by robot: its first frame from there on has not come; empty: no answer yet
 };
 

@@ -4,8 +4,10 @@
 #include <utility>
 
 #include "plumbline/maps/stored_maps.hpp"
+#include "robots/camera_refinement.hpp"
 #include "robots/robot_components.hpp"
 #include "stages/stages.hpp"
+#include "summary/sections.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -13,6 +15,7 @@ namespace {
 class MapsStage : public Stage {
  public:
   core::Result<void> start(const RunContext& context) override {
+    log_ = context.log;
     maps_ = context.input.stored_maps;
     if (maps_ == nullptr) {
       return core::usage_error("a pipeline that begins with finished maps is run by plumbline fuse");
@@ -47,10 +50,20 @@ class MapsStage : public Stage {
       for (RobotMap& component : components_of(whole).maps) result->maps.push_back(std::move(component));
     }
     io.output<RobotMaps>("maps", result);
+    for (const Json& pair : camera_pairs(maps_->robots())) log_->info(pair.at("text").get<std::string>());
     return {};
   }
 
+  /// The cameras as the runs found them that made the maps.
+  void report(Json& summary) const override {
+    for (const RobotInfo& robot : maps_->robots()) {
+      if (robot.estimate) summary["camera"].push_back(camera_section(robot));
+    }
+    summary["camera_pairs"] = camera_pairs(maps_->robots());
+  }
+
  private:
+  core::Log* log_ = nullptr;
   const maps::StoredMaps* maps_ = nullptr;
 };
 

@@ -58,6 +58,7 @@ class TrackStage : public Stage {
     observed_.resize(slams_.size());
     if (context.resumed != nullptr) restore(*context.resumed);
     stored_robots_ = cameras_->robots();
+    stored_news_ = cameras_->news();
     return {};
   }
 
@@ -152,6 +153,7 @@ class TrackStage : public Stage {
                                   {"urgent", count(mapping::KeyframeCause::kUrgent)},
                                   {"plain", count(mapping::KeyframeCause::kPlain)}};
     summary["camera"] = cameras_->section();
+    summary["camera_pairs"] = camera_pairs(cameras_->robots());
     if (context_->hooks.feedback != nullptr)
       summary["feedback"] = feedback_section(slams_, *context_->hooks.feedback);
   }
@@ -193,8 +195,15 @@ class TrackStage : public Stage {
     Unstored& unstored = unstored_[number];
     tracked.changes = std::make_shared<maps::MapChanges>(slam.map().changes_since(unstored.since));
     unstored.since = slam.map().now();
-    if (!std::exchange(unstored.new_camera, false)) return;
-    stored_robots_[number] = cameras_->robots()[number];
+
+    // A new camera is stored with the map that was made anew for it, news of any camera at once.
+    const bool news = stored_news_ < cameras_->news();
+    stored_news_ = cameras_->news();
+    const bool new_camera = std::exchange(unstored.new_camera, false);
+    if (!new_camera && !news) return;
+    for (std::size_t r = 0; r < stored_robots_.size(); ++r)
+      stored_robots_[r].estimate = cameras_->robots()[r].estimate;
+    if (new_camera) stored_robots_[number].versions = cameras_->robots()[number].versions;
     tracked.robots = std::make_shared<std::vector<RobotInfo>>(stored_robots_);
   }
 
@@ -220,20 +229,14 @@ class TrackStage : public Stage {
   /// Continues where another run stopped, with the cameras that it had found.
   void restore(const ResumedRun& run) {
     rows_ = run.rows;
-    if (run.merged) {
-      for (const RobotInfo& stored : run.merged->robots)
-        cameras_->restore(stored, *slams_.at(static_cast<std::size_t>(stored.number)));
-    }
+    if (run.merged) cameras_->resume(run.merged->robots, slams_);
+    if (!run.maps.empty()) cameras_->resume(run.maps.begin()->second.header.robots, slams_);
 
     for (const auto& [robot, map] : run.maps) {
       const auto number = static_cast<std::size_t>(robot);
-      for (const RobotInfo& stored : map.header.robots) {
-        if (stored.number == robot) cameras_->restore(stored, *slams_.at(number));
-      }
       slams_.at(number)->restore(map.map, map.frames);
       unstored_[number].since = slams_[number]->map().now();
     }
-    cameras_->resume();
   }
 
   /// Path of one robot, for observers.
@@ -251,6 +254,7 @@ class TrackStage : public Stage {
   std::vector<ObservedWay> observed_;     ///< by robot
   std::vector<Unstored> unstored_;        ///< by robot
   std::vector<RobotInfo> stored_robots_;  ///< it learns of a robot's camera with its next keyframe
+  int stored_news_ = 0;
   std::vector<FrameRow> rows_;
   std::map<mapping::KeyframeCause, std::size_t> causes_;      ///< of the keyframes
   std::map<core::KeyframeId, std::size_t> component_frames_;  ///< by root, as the frames were tracked

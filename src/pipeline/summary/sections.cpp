@@ -66,7 +66,8 @@ Json empty_sections() {
           {"components", {{"list", none}, {"dropped", 0}, {"dropped_frames", 0}}},
           {"cloud", {{"points", 0}, {"voxel_m", 0.0}}},
           {"frame", {{"up", "none"}, {"yaw", "none"}, {"output_from_map", rows({})}}},
-          {"camera", none}};
+          {"camera", none},
+          {"camera_pairs", none}};
 }
 
 double rounded(double value) { return std::round(value * 1e4) / 1e4; }

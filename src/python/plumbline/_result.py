@@ -188,6 +188,16 @@ class Result:
         file = folder / "camera.yaml"
         return Camera.from_yaml((file if file.exists() else self.folder / "camera.yaml").read_text(encoding="utf-8"))
 
+    @property
+    def camera_findings(self) -> Dict[str, Dict[str, Any]]:
+        """What is known of each robot's camera, by robot: numbers with their sigma, as summary.json has it."""
+        return {str(entry["robot"]): entry for entry in self.summary.get("camera", [])}
+
+    @property
+    def camera_pairs(self) -> List[Dict[str, Any]]:
+        """Of each two robots whether their cameras may be one: `a`, `b`, `agree`, `chi2`, `sigmas`, `number`, `text`."""
+        return list(self.summary.get("camera_pairs", []))
+
     def image(self, frame: int, robot: str = "") -> Frame:
         """A frame of the mapped recording, by its number in Keyframes and Landmarks; `robot`: one of several.
 

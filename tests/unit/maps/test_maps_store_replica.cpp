@@ -159,6 +159,56 @@ TEST(StoreReplica, OneThatComesLateIsToldLess) {
   EXPECT_LT(late->bytes().map, early->bytes().map);
 }
 
+TEST(StoreReplica, HasWhatIsKnownOfTheCamerasAsItsStore) {
+  const StoreFolder folder;
+  StoreWorld world(36);
+  StoreStep step;
+  world.step();
+  step.map = std::make_shared<MapChanges>(world.map.changes_since({}));
+  auto writer = StoreWriter::create(folder.file(), header_of(world.camera));
+  ASSERT_TRUE(writer);
+  ASSERT_TRUE(writer->add(step));
+  ASSERT_TRUE(load_map(folder.file())) << "as an earlier program made it, without the row";
+  EXPECT_FALSE(load_map(folder.file())->header.robots.front().estimate);
+
+  // It comes with a step, before the camera is used.
+  std::vector<RobotInfo> robots = header_of(world.camera).robots;
+  CameraEstimate& known = robots.front().estimate.emplace();
+  known = {51, 207, 1, 44, true, 0.125, "", "a doubt", world.camera};
+  known.found.color.fx = 517.25;
+  known.covariance = Eigen::Matrix<double, 9, 9>::Identity() * 0.25;
+  known.covariance(0, 8) = known.covariance(8, 0) = -0.125;
+  known.wrong[5] = 0.75;
+  step.robots = std::make_shared<std::vector<RobotInfo>>(robots);
+  ASSERT_TRUE(writer->add(step));
+  auto copy = StoreReplica::open(folder.path / "copy.db");
+  ASSERT_TRUE(copy);
+  follow(folder.file(), *copy);
+  for (const char* file : {"map.db", "copy.db"}) {
+    const auto stored = load_map(folder.path / file);
+    ASSERT_TRUE(stored) << stored.error().message;
+    const RobotInfo& robot = stored->header.robots.front();
+    ASSERT_TRUE(robot.estimate && robot.versions.empty()) << file;
+    EXPECT_EQ(robot.estimate->asked_at, 51);
+    EXPECT_EQ(robot.estimate->used_from, 207);
+    EXPECT_EQ(robot.estimate->views, 44);
+    EXPECT_TRUE(robot.estimate->better);
+    EXPECT_EQ(robot.estimate->doubt, "a doubt");
+    EXPECT_EQ(robot.estimate->found.color.fx, 517.25);
+    EXPECT_EQ(robot.estimate->covariance, known.covariance);
+    EXPECT_EQ(robot.estimate->wrong, known.wrong);
+  }
+  EXPECT_EQ(dump(folder.path / "copy.db"), dump(folder.file()));
+
+  // A stranger's nonsense is refused.
+  robots.front().estimate->covariance(3, 3) = -1.0;
+  step.robots = std::make_shared<std::vector<RobotInfo>>(robots);
+  ASSERT_TRUE(writer->add(step));
+  const auto next = next_transaction(folder.file(), StoreStream::kMap, copy->heads().map);
+  ASSERT_TRUE(next && *next);
+  EXPECT_FALSE(take_one(*copy, StoreStream::kMap, **next, 1000));
+}
+
 TEST(StoreReplica, GoesOnWhereItWasCommitted) {
   const StoreFolder folder;
   const auto copied = folder.path / "copy.db";

@@ -242,7 +242,10 @@ static std::string cameras_html(const Json& s) {
                  flag_at(n, "/used") ? used : "not used"});
     }
   }
-  return table.rows() > 0 ? "<h3>Cameras</h3>\n" + table.html() : "";
+  if (table.rows() == 0) return "";
+  std::string shared;
+  for (const Json& pair : list_at(s, "/camera_pairs")) shared += note(text_at(pair, "/text") + ".");
+  return "<h3>Cameras</h3>\n" + table.html() + shared;
 }
 
 std::string refinement_html(const ReportData& data) {
