@@ -17,6 +17,7 @@ enum class Route { kScene, kTour, kLaps, kWander, kThereAndBack };  ///< kScene:
 
 struct SynthOptions {
   int frames = -1;             ///< per robot; -1: the path once; more than the path has: it starts again
+  int repeat = 1;              ///< rounds of the path; one is rendered, the others are its frames again
   int robots = 1;              ///< number of recordings
   int layout = -1;             ///< number of a world that is made from it; -1: the scene as its file says
   int floors = 3;              ///< storeys of a building
@@ -25,6 +26,8 @@ struct SynthOptions {
   int copies = 0;              ///< the same with the same posters
   Route path = Route::kScene;  ///< through a world made from a number
   std::string changes;         ///< a seed or a file of edits: the same world another day; "": as it is
+  bool hall = false;           ///< one room of an office or building is 20 m long
+  int moving_doors = 0;        ///< at most so many doors of a world made from a number swing meanwhile
   int walkers = 0;             ///< number of the scene's walkers to film; they are not in reference.ply
   Texture texture = Texture::kFull;  ///< kNone: white cloth and grey floors, geometry unchanged
   Sensor sensor = Sensor::kKinect;   ///< kIdeal: no noise, no offset between stamps, no blur

@@ -102,6 +102,21 @@ struct DoorLeaf {
   double open_rad = 0.0;
 };
 
+/// A leaf that swings to another angle and back at times.
+struct MovingDoor {
+  std::size_t leaf = 0;    ///< index into Scene::leaves
+  int opening = 0;         ///< index into Plan::openings
+  double rest_rad = 0.0;   ///< how far it is open else
+  double other_rad = 0.0;  ///< where it swings to
+  double swing = 1.5;      ///< s that it takes to swing there, and back
+  double hold = 3.0;       ///< s that it stays there
+  std::vector<double>
+      starts;  ///< s after the first frame, rising; of the first round of a path that is repeated
+
+  /// Angle from shut, t seconds after the first frame.
+  [[nodiscard]] double angle(double t) const;
+};
+
 /// One difference from the world as it was made.
 struct SceneChange {
   std::string kind;               ///< moved, added, removed, wall, door, light
@@ -128,8 +143,9 @@ struct Scene {
   std::vector<Walker> walkers;        ///< the options say how many of them are filmed
   std::vector<Event> events;
   std::vector<DoorLeaf> leaves;
-  std::vector<SceneChange> changes;  ///< those of the options, done
-  std::optional<Plan> plan;          ///< of a world made from a number
+  std::vector<MovingDoor> moving_doors;  ///< those of the options
+  std::vector<SceneChange> changes;      ///< those of the options, done
+  std::optional<Plan> plan;              ///< of a world made from a number
 };
 
 /// `name_or_file`: a shipped scene (a file of `scenes_folder` without .yaml) or a path. All problems of the

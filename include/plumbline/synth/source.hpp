@@ -35,6 +35,13 @@ struct PathMotion {
   Eigen::Vector3d turn_rate;     ///< rad/s, in that frame
 };
 
+/// A door of a world made from a number that swings.
+struct DoorSwing {
+  int opening;      ///< index into Plan::openings
+  double from, to;  ///< stamps, s
+  double open_rad;  ///< how far it is open afterwards
+};
+
 class SynthSource final : public dataset::FrameSource {
  public:
   /// Robot `robot` (from 0) of the scene. Errors: no frames, path through a solid (names the segment and the
@@ -48,12 +55,16 @@ class SynthSource final : public dataset::FrameSource {
   [[nodiscard]] const sensor::Camera& camera() const override;
   [[nodiscard]] const sensor::Camera& true_camera() const;
   [[nodiscard]] std::size_t size() const override;
+  /// Frames of one round (SynthOptions::repeat); frame i shows what frame i modulo this shows.
+  [[nodiscard]] std::size_t round() const;
   [[nodiscard]] dataset::PairInfo info(std::size_t index) const override;
   /// With the time at which depth really was taken.
   [[nodiscard]] dataset::PairInfo true_info(std::size_t index) const;
   [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override;
   /// As the sensors give them, not rectified.
   [[nodiscard]] core::Result<dataset::StoredPair> stored(std::size_t index) const override;
+  /// The same, rendered anew and not kept for further rounds.
+  [[nodiscard]] dataset::StoredPair rendered(std::size_t index) const;
   /// Null if the camera's file is right.
   [[nodiscard]] std::unique_ptr<dataset::FrameSource> taken_by(const sensor::Camera& better) const override;
   /// Exact poses at the colour stamps, in the frame of the scene file.
@@ -68,6 +79,8 @@ class SynthSource final : public dataset::FrameSource {
   /// Time of the first frame without jitter, from which events count.
   [[nodiscard]] double start() const;
   [[nodiscard]] const std::vector<Event>& events() const;
+  /// All that begin before the last frame, in the order of doors and times.
+  [[nodiscard]] std::vector<DoorSwing> swings() const;
   /// CV_8UC1, 255 where the colour picture shows something that moves; empty if the world has nothing that
   /// does.
   [[nodiscard]] cv::Mat1b moving(std::size_t index) const;

@@ -115,8 +115,9 @@ BuildingFrame draw_frame(const SynthOptions& options, Rng& rng) {
   frame.low =
       kEntry + kLanding + steps_of(frame.pitch) * kGoing + 0.5 * frame.outer + 0.15 + rng.uniform(0.0, 0.6);
   const int side = (options.rooms + 1) / 2;
-  const double length = std::max({side * rng.uniform(3.4, 4.4), (options.rooms - side) * 3.2 + frame.stairs,
-                                  6.5 + 3.2 * std::max(options.like, options.copies), 9.0});
+  const double length =
+      std::max({side * rng.uniform(3.4, 4.4), (options.rooms - side) * 3.2 + frame.stairs,
+                6.5 + 3.2 * std::max(options.like, options.copies), options.hall ? 24.5 : 9.0});
   frame.size = {length, frame.low + frame.corridor + rng.uniform(3.8, 6.0)};
   return frame;
 }
@@ -220,7 +221,8 @@ bool build_building(const SynthOptions& options, std::uint64_t seed, Scene& scen
     part.copies = plan.copies;
 
     const int alike = std::max(options.like, options.copies);
-    if (!add_rooms(draw_storey(frame, options.rooms, alike, cells), rooms, part)) return false;
+    if (!add_rooms(draw_storey(frame, options.rooms, alike, options.hall && storey == 0, cells), rooms, part))
+      return false;
     const bool lowest = storey == 0, highest = storey + 1 == options.floors;
     for (PlanRoom& room : part.rooms) {
       room.height = std::min(room.height, frame.height);

@@ -120,18 +120,29 @@ void slice_alike(Subdivision& s, int index, int alike, Rng& rng) {
   }
 }
 
-Subdivision draw_office(int alike, Rng& rng) {
-  const double corridor = rng.uniform(1.5, 2.6), low = rng.uniform(3.6, 6.5), high = rng.uniform(3.6, 6.5);
-  const double length = std::max(rng.uniform(16.0, 30.0), alike > 1 ? 6.5 + 3.2 * alike : 0.0);
+/// Cuts off a hall of 20 m between its walls, which begins at the outer wall.
+void cut_hall(Subdivision& s, int index, Rng& rng) {
+  const Eigen::AlignedBox2d box = s.bounds(cell(s, index));
+  const auto hall =
+      s.split(index, {box.min().x() + 20.4, box.center().y()}, Vector2d::UnitY(), inner_wall(rng));
+  if (hall) cell(s, *hall).kind = "hall";
+}
+
+Subdivision draw_office(int alike, bool hall, Rng& rng) {
+  const double corridor = rng.uniform(1.5, 2.6), low = rng.uniform(3.6, 6.5);
+  const double high = hall ? rng.uniform(6.5, 9.5) : rng.uniform(3.6, 6.5);
+  const double length =
+      std::max({rng.uniform(16.0, 30.0), alike > 1 ? 6.5 + 3.2 * alike : 0.0, hall ? 24.5 : 0.0});
   Subdivision s({length, low + corridor + high}, rng.uniform(0.28, 0.45));
   const int middle = cut(s, 0, 1, low + corridor, rng, false).value_or(0);
   const int lowest = cut(s, middle, 1, low, rng, false).value_or(0);
   cell(s, middle).kind = "corridor";
 
   if (alike > 1) slice_alike(s, 0, alike, rng);
+  if (hall) cut_hall(s, 0, rng);
   slice(s, 0, 2.4, rng.uniform(5.0, 9.0), rng);
   slice(s, lowest, 2.4, rng.uniform(5.0, 9.0), rng);
-  if (rng.chance(0.35)) make_hall(s, rng);
+  if (!hall && rng.chance(0.35)) make_hall(s, rng);
   merge_some(s, 0.1, 58.0, rng);
   return s;
 }
@@ -172,9 +183,9 @@ Subdivision draw_corridors(Rng& rng) {
 
 }  // namespace
 
-Subdivision draw_cells(const std::string& kind, int alike, Rng& rng) {
+Subdivision draw_cells(const std::string& kind, int alike, bool hall, Rng& rng) {
   if (kind == "home") return draw_home(rng);
-  return kind == "office" ? draw_office(alike, rng) : draw_corridors(rng);
+  return kind == "office" ? draw_office(alike, hall, rng) : draw_corridors(rng);
 }
 
 namespace {
@@ -189,7 +200,7 @@ void slice_into(Subdivision& s, int index, int count, Rng& rng) {
 
 }  // namespace
 
-Subdivision draw_storey(const BuildingFrame& frame, int rooms, int alike, Rng& rng) {
+Subdivision draw_storey(const BuildingFrame& frame, int rooms, int alike, bool hall, Rng& rng) {
   Subdivision s(frame.size, frame.outer);
   constexpr double kThickness = 0.24;
   const auto level = [&](int index, double y) {
@@ -203,9 +214,11 @@ Subdivision draw_storey(const BuildingFrame& frame, int rooms, int alike, Rng& r
 
   const int high = std::max((rooms + 1) / 2, alike > 1 ? alike + 2 : 0);
   if (alike > 1) slice_alike(s, 0, alike, rng);
-  slice_into(s, 0, high - (alike > 1 ? alike + 1 : 0), rng);
+  if (hall) cut_hall(s, 0, rng);
+  const int taken = alike > 1 ? alike + 1 : hall ? static_cast<int>(high * 20.4 / frame.size.x()) : 0;
+  slice_into(s, 0, high - taken, rng);
   slice_into(s, lowest, std::max(1, rooms - high), rng);
-  if (alike < 2 && rng.chance(0.5)) make_hall(s, rng);
+  if (alike < 2 && !hall && rng.chance(0.5)) make_hall(s, rng);
   return s;
 }
 

@@ -39,7 +39,8 @@ core::Result<std::optional<Scene>> try_layout(const std::string& kind, const Syn
   } else {
     Rng cells(seed, 1), rooms(seed, 2), openings(seed, 3), shell(seed, 4), things(seed, 5);
 
-    if (!add_rooms(draw_cells(kind, std::max(options.like, options.copies), cells), rooms, plan) ||
+    if (!add_rooms(draw_cells(kind, std::max(options.like, options.copies), options.hall, cells), rooms,
+                   plan) ||
         !add_openings(openings, plan) || !make_alike(plan)) {
       return nothing;
     }
@@ -87,6 +88,11 @@ core::Result<Scene> make_layout(const std::string& kind, const SynthOptions& opt
   if (std::max(options.like, options.copies) > 1 && (kind == "home" || kind == "corridor")) {
     return core::usage_error(
         fmt::format("like, copies: a {} has no rooms alike; office and building have", kind));
+  }
+  if (options.hall && (kind == "home" || kind == "corridor" || std::max(options.like, options.copies) > 1)) {
+    return core::usage_error(
+        "hall: an office or a building has one, where no rooms are alike; leave out hall, or like and "
+        "copies");
   }
   constexpr int kAttempts = 200;
 

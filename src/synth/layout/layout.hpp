@@ -11,8 +11,8 @@
 namespace plumbline::synth {
 
 /// Cells of a home, an office or a ring of corridors; cells of the kind "outside" are no rooms. `alike`:
-/// rooms of an office that have the same shape.
-Subdivision draw_cells(const std::string& kind, int alike, Rng& rng);
+/// rooms of an office that have the same shape; `hall`: one of its rooms is 20 m long.
+Subdivision draw_cells(const std::string& kind, int alike, bool hall, Rng& rng);
 
 /// The storeys of a building have the corridor and the stairs in common.
 struct BuildingFrame {
@@ -25,7 +25,7 @@ struct BuildingFrame {
 };
 
 /// Cells of one storey.
-Subdivision draw_storey(const BuildingFrame& frame, int rooms, int alike, Rng& rng);
+Subdivision draw_storey(const BuildingFrame& frame, int rooms, int alike, bool hall, Rng& rng);
 
 /// A building of several storeys with stairs; nothing if it did not come out.
 bool build_building(const SynthOptions& options, std::uint64_t seed, Scene& scene, Plan& plan);

@@ -32,16 +32,30 @@ double yaw_of(const geometry::Rigid3& world_from_body) {
   return std::atan2(ahead.y(), ahead.x());
 }
 
+ImuErrors draw_imu(const ImuModel& model, Rng& rng) {
+  ImuErrors e;
+  e.gyro_bias = normals(rng, model.gyro_bias);
+  e.accel_bias = normals(rng, model.accel_bias);
+  e.gyro_axes = wrong_axes(rng, model.scale, model.misalign);
+  e.accel_axes = wrong_axes(rng, model.scale, model.misalign);
+  return e;
+}
+
+constexpr std::uint64_t kImuStream = 0x1a0;
+
 }  // namespace
+
+ImuErrors imu_errors(const ImuModel& model, std::uint64_t seed) {
+  Rng rng(seed, kImuStream);
+  return draw_imu(model, rng);
+}
 
 std::vector<dataset::ImuReading> imu_readings(const SynthSource& source, const ImuModel& model,
                                               std::uint64_t seed) {
   const Vector3d gravity(0.0, 0.0, -9.81);
   const double step = 1.0 / model.rate, root = std::sqrt(model.rate);
-  Rng rng(seed, 0x1a0);
-  Vector3d gyro_bias = normals(rng, model.gyro_bias), accel_bias = normals(rng, model.accel_bias);
-  const Eigen::Matrix3d gyro_axes = wrong_axes(rng, model.scale, model.misalign);
-  const Eigen::Matrix3d accel_axes = wrong_axes(rng, model.scale, model.misalign);
+  Rng rng(seed, kImuStream);
+  auto [gyro_bias, accel_bias, gyro_axes, accel_axes] = draw_imu(model, rng);
   const geometry::Rigid3 camera_from_body = source.body_from_camera().inverse();
   std::vector<dataset::ImuReading> readings;
   double silent_until = -1.0;

@@ -12,6 +12,13 @@
 
 namespace plumbline::synth {
 
+/// Errors of one inertial sensor, drawn from a model.
+struct ImuErrors {
+  Eigen::Vector3d gyro_bias, accel_bias;  ///< rad/s, m/s^2 at the first reading
+  Eigen::Matrix3d gyro_axes, accel_axes;  ///< reading = axes true + bias
+};
+ImuErrors imu_errors(const ImuModel& model, std::uint64_t seed);
+
 /// Readings from the first frame to the last.
 std::vector<dataset::ImuReading> imu_readings(const SynthSource& source, const ImuModel& model,
                                               std::uint64_t seed);

@@ -38,6 +38,15 @@ dataset::PairInfo labelled(const SynthSource& source, std::size_t index) {
   return info;
 }
 
+/// Makes a file that is the same as another one.
+Result<void> repeat_file(const fs::path& from, const fs::path& to) {
+  std::error_code ec;
+  fs::create_hard_link(from, to, ec);
+  if (ec) fs::copy_file(from, to, ec);  // disks of some kinds have no links
+  if (ec) return core::output_error(fmt::format("{}: cannot be written: {}", to.string(), ec.message()));
+  return {};
+}
+
 /// Share of a colour picture that moves; its mask is written if asked.
 Result<double> write_moving(const SynthSource& source, std::size_t index, const fs::path& folder, bool mask) {
   cv::Mat1b moves = source.moving(index);
@@ -53,11 +62,18 @@ Result<double> write_moving(const SynthSource& source, std::size_t index, const 
 
 /// Writes one pair; "" or what went wrong.
 std::string write_pair(const SynthSource& source, std::size_t index, const fs::path& folder) {
-  const auto pair = source.stored(index);
-  if (!pair) return pair.error().message;
   const dataset::PairInfo info = labelled(source, index);
-  auto written = dataset::write_png(folder / color_name(info), pair->color.pixels);
-  if (written) written = dataset::write_png(folder / depth_name(info), pair->depth.pixels);
+  Result<void> written;
+  if (index >= source.round()) {
+    const dataset::PairInfo first = labelled(source, index % source.round());
+    written = repeat_file(folder / color_name(first), folder / color_name(info));
+    if (written) written = repeat_file(folder / depth_name(first), folder / depth_name(info));
+    return written ? "" : written.error().message;
+  }
+
+  const dataset::StoredPair pair = source.rendered(index);
+  written = dataset::write_png(folder / color_name(info), pair.color.pixels);
+  if (written) written = dataset::write_png(folder / depth_name(info), pair.depth.pixels);
   return written ? "" : written.error().message;
 }
 
@@ -107,7 +123,9 @@ Result<std::size_t> write_pictures(const Job& job) {
   std::size_t done = 0;
 
   while (done < job.source.size() && !job.stop.stop_requested()) {
-    const std::size_t count = std::min(batch, job.source.size() - done);
+    // The first round is written before it is repeated.
+    const std::size_t end = done < job.source.round() ? job.source.round() : job.source.size();
+    const std::size_t count = std::min(batch, end - done);
     std::vector<std::string> problems(count);
     job.executor.parallel_for(
         count, [&](std::size_t i) { problems[i] = write_pair(job.source, done + i, job.folder); });
@@ -123,8 +141,9 @@ Result<std::size_t> write_pictures(const Job& job) {
 
 /// Truth beside the first `frames` frames.
 Result<void> write_truth(const Job& job, std::size_t frames) {
-  std::vector<Result<double>> shares(frames, 0.0);
-  job.executor.parallel_for(frames, [&](std::size_t i) {
+  const std::size_t round = std::min(frames, job.source.round());
+  std::vector<Result<double>> shares(round, 0.0);
+  job.executor.parallel_for(round, [&](std::size_t i) {
     shares[i] = write_moving(job.source, i, job.folder, job.options.moving_masks);
   });
   std::vector<double> moving;
@@ -133,9 +152,18 @@ Result<void> write_truth(const Job& job, std::size_t frames) {
     moving.push_back(*share);
   }
 
+  const auto mask = [&](std::size_t i) {
+    return job.folder / "moving" / color_name(labelled(job.source, i)).substr(4);
+  };
+  for (std::size_t i = round; i < frames; ++i) {
+    moving.push_back(moving[i % round]);
+    if (!job.options.moving_masks) continue;
+    if (auto done = repeat_file(mask(i % round), mask(i)); !done) return done;
+  }
+
   auto ok = write_lists(job.source, frames, job.folder, !job.options.mcap);
   if (ok) ok = core::write_file(job.folder / "truth.csv", describe_truth(job.source, moving));
-  if (ok && !job.source.events().empty())
+  if (ok && !(job.source.events().empty() && job.source.swings().empty()))
     ok = core::write_file(job.folder / "events.csv", describe_events(job.source));
   if (ok && !job.options.camera_error.empty())
     ok = core::write_file(job.folder / "camera.true.yaml", sensor::to_yaml(job.source.true_camera()));
@@ -181,8 +209,23 @@ nlohmann::json describe_camera(const sensor::Camera& c) {
           {"depth_delay", c.depth_delay_s}};
 }
 
+/// Errors of an inertial sensor, as they were drawn.
+nlohmann::json describe_imu_errors(const ImuModel& model, std::uint64_t seed) {
+  const ImuErrors e = imu_errors(model, seed);
+  const auto list = [](const Eigen::Vector3d& v) { return nlohmann::json{v.x(), v.y(), v.z()}; };
+  const auto rows = [&](const Eigen::Matrix3d& m) {
+    return nlohmann::json{list(m.row(0)), list(m.row(1)), list(m.row(2))};
+  };
+  return {{"gyro_bias", list(e.gyro_bias)},
+          {"accel_bias", list(e.accel_bias)},
+          {"gyro_axes", rows(e.gyro_axes)},
+          {"accel_axes", rows(e.accel_axes)},
+          {"delay", model.delay}};
+}
+
 nlohmann::json describe_robot(const SynthSource& source, const std::string& folder,
-                              const std::string& path_name, std::size_t frames, const SynthOptions& options) {
+                              const std::string& path_name, std::size_t frames, const SynthOptions& options,
+                              std::uint64_t seed) {
   const auto first = source.info(0), last = source.info(source.size() - 1);
   const geometry::Rigid3 start = source.world_from_camera(first.stamp);
   const Eigen::Quaterniond q = start.quaternion();
@@ -202,6 +245,7 @@ nlohmann::json describe_robot(const SynthSource& source, const std::string& fold
                       {"true", describe_camera(source.true_camera())}};
   }
 
+  if (!options.imu.empty()) json["imu"] = describe_imu_errors(*imu_model(options.imu), seed);
   if (!options.rig.empty()) {
     const Eigen::Quaterniond turn = source.body_from_camera().quaternion();
     const Eigen::Vector3d& place = source.body_from_camera().translation;
@@ -328,7 +372,7 @@ Result<nlohmann::json> write_robots(const std::vector<std::unique_ptr<SynthSourc
     summary.path_m += sources[i]->path_length();
     robots.push_back(describe_robot(*sources[i], folder,
                                     scene.robots[options.rig.empty() ? i % scene.robots.size() : 0].name,
-                                    *written, options));
+                                    *written, options, job.seed));
   }
 
   summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -172,8 +172,8 @@ void Visibility::mark(const geometry::Rigid3& world_from_camera, const sensor::P
 }
 
 void Visibility::add(const SynthSource& source, const core::Executor& executor, const core::StopToken& stop) {
-  const std::size_t step = std::max<std::size_t>(3, source.size() / 200);
-  const std::size_t looks = (source.size() + step - 1) / step;
+  const std::size_t step = std::max<std::size_t>(3, source.round() / 200);
+  const std::size_t looks = (source.round() + step - 1) / step;
   executor.parallel_for(looks, [&](std::size_t k) {
     const dataset::PairInfo info = source.true_info(k * step);
     if (!stop.stop_requested() && !source.blind(k * step)) {
@@ -192,8 +192,9 @@ core::Result<ReferenceCounts> write_reference(const std::filesystem::path& file,
                                               const Visibility& visibility, double spacing,
                                               const core::Executor& executor) {
   std::vector<std::vector<PlySample>> parts(world.fixed_faces);
-  executor.parallel_for(parts.size(),
-                        [&](std::size_t i) { parts[i] = sample_face(world, visibility, i, spacing); });
+  executor.parallel_for(parts.size(), [&](std::size_t i) {
+    if (world.gone[i] == 0) parts[i] = sample_face(world, visibility, i, spacing);
+  });
 
   ReferenceCounts counts;
   for (const auto& part : parts) {

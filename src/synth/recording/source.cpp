@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "plumbline/sensor/rectify.hpp"
+#include "recording/kept_round.hpp"
 #include "render/color_faults.hpp"
 #include "render/depth_sensor.hpp"
 #include "render/path.hpp"
@@ -84,6 +85,21 @@ std::vector<Stamps> make_stamps(const SynthOptions& o, const std::vector<Event>&
   return out;
 }
 
+/// A path can be repeated if all its rounds are the same.
+core::Result<void> check_repeat(const RobotPath& way, const std::vector<Event>& events) {
+  if (!way.closed) {
+    return core::usage_error(fmt::format(
+        "repeat: the path of {} does not end where it began; add `closed: true` to it in a copy of "
+        "the scene, or take a world made from a number (layout), whose paths do",
+        way.name));
+  }
+  for (const Event& e : events) {
+    if (e.kind == EventKind::kSpin)
+      return core::usage_error("repeat: a spin makes rounds differ; leave out one of the two");
+  }
+  return {};
+}
+
 }  // namespace
 
 struct SynthSource::Impl {
@@ -102,6 +118,9 @@ struct SynthSource::Impl {
   std::uint64_t seed = 0;
   std::shared_ptr<const CameraPath> path;
   std::vector<Stamps> frames;
+  std::size_t round = 0;            ///< frames of one round; later ones are these again
+  std::vector<Event> events;        ///< of all rounds
+  std::shared_ptr<KeptRound> kept;  ///< null: there is one round
   NoiseTiles tiles;
   /// Automatic exposure, every kGainStep frames, as far as it was needed; of all sources of this recording.
   struct Exposures {
@@ -129,6 +148,9 @@ struct SynthSource::Impl {
     return camera.depth ? *camera.depth : camera.color;
   }
   [[nodiscard]] core::Result<void> check_way() const;
+  void repeat();
+  /// The frame of the first round that frame `index` shows again.
+  [[nodiscard]] const Stamps& first_of(std::size_t index) const { return frames.at(index % round); }
   [[nodiscard]] float gain(std::int64_t number) const;
   /// Factor of faults on the gain of a frame's row that is taken at `stamp`.
   [[nodiscard]] float row_gain(const Stamps& at, double stamp) const {
@@ -223,7 +245,15 @@ cv::Mat2f SynthSource::Impl::flow(const View& view, const Stamps& at, double ext
       }
 
       const Vector3d p = view.world_from_camera * view.camera.unproject(x, y, z);
-      const Eigen::Vector2d d = view.camera.project(later * p) - view.camera.project(sooner * p);
+      const World::Mover* mover = color_faults.motion_blur > 0.0 ? world->mover_of(view.ids(y, x)) : nullptr;
+      const auto at_time = [&](double dt) -> Vector3d {
+        const double now = at.color - kFirstStamp;
+        return mover == nullptr
+                   ? p
+                   : world->motion(*mover, now + dt) * (world->motion(*mover, now).inverse() * p);
+      };
+      const Eigen::Vector2d d = view.camera.project(later * at_time(0.5 * exposure)) -
+                                view.camera.project(sooner * at_time(-0.5 * exposure));
       out(j, i) = {static_cast<float>(d.x() + extra_px * std::cos(angle)),
                    static_cast<float>(d.y() + extra_px * std::sin(angle))};
     }
@@ -285,6 +315,30 @@ cv::Mat3b SynthSource::Impl::color(const Stamps& at) const {
   return image;
 }
 
+/// The frames of one round, and again with later stamps.
+void SynthSource::Impl::repeat() {
+  const SynthOptions& o = world->options;
+  const auto once = static_cast<std::size_t>(std::lround(path->duration() * o.fps));
+  const std::size_t all = once * static_cast<std::size_t>(o.repeat);
+  const std::size_t wanted = o.frames > 0 ? std::min(all, static_cast<std::size_t>(o.frames)) : all;
+  frames = make_stamps(o, world->events, std::min(once, wanted), seed);
+  round = frames.size();
+  kept = std::make_shared<KeptRound>(round);
+
+  for (std::size_t first = once; first < wanted; first += once) {
+    const double later = static_cast<double>(first) / o.fps;
+    for (std::size_t i = 0; i < round; ++i) {
+      const Stamps& at = frames[i];
+      if (first + static_cast<std::size_t>(at.number) >= wanted) break;
+      frames.push_back({at.number, whole_us(at.color + later), whole_us(at.depth + later)});
+    }
+    for (Event event : world->events) {
+      event.start_s += later;
+      events.push_back(event);
+    }
+  }
+}
+
 SynthSource::SynthSource(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 SynthSource::~SynthSource() = default;
 
@@ -327,20 +381,20 @@ core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_p
     impl->rectifier = std::make_shared<const sensor::Rectifier>(impl->told);
   impl->seed = mix(static_cast<std::uint64_t>(o.seed), static_cast<std::uint64_t>(robot) + 1);
 
-  CameraPath::Options motion;
-  motion.speed = o.speed;
-  motion.wheeled = (o.motion == Motion::kScene ? world->scene.motion : o.motion) == Motion::kWheeled;
-  motion.seed = mix(static_cast<std::uint64_t>(o.seed), static_cast<std::uint64_t>(driver) + 1);
+  if (o.repeat > 1) {
+    if (auto ok = check_repeat(way, world->events); !ok) return tl::unexpected<core::Error>(ok.error());
+  }
+  impl->path = std::make_shared<const CameraPath>(camera_path(world->scene, o, world->events, driver));
 
-  // More robots than paths: the next ones start further along.
-  const auto lap = static_cast<std::size_t>(driver) / paths;
-  motion.start_share = 0.381966 * static_cast<double>(lap);
-  motion.events = world->events;
-  impl->path = std::make_shared<const CameraPath>(way, motion);
-
-  const std::size_t frames = o.frames > 0 ? static_cast<std::size_t>(o.frames)
-                                          : static_cast<std::size_t>(impl->path->duration() * o.fps) + 1;
-  impl->frames = make_stamps(o, world->events, frames, impl->seed);
+  impl->events = world->events;
+  if (o.repeat > 1) {
+    impl->repeat();
+  } else {
+    const std::size_t frames = o.frames > 0 ? static_cast<std::size_t>(o.frames)
+                                            : static_cast<std::size_t>(impl->path->duration() * o.fps) + 1;
+    impl->frames = make_stamps(o, world->events, frames, impl->seed);
+    impl->round = impl->frames.size();
+  }
   if (impl->frames.empty())
     return core::usage_error("events: every frame is dropped, nothing is left to film");
   if (auto free = impl->check_way(); !free) return tl::unexpected<core::Error>(free.error());
@@ -380,6 +434,7 @@ const std::string& SynthSource::format() const { return impl_->format; }
 const sensor::Camera& SynthSource::camera() const { return impl_->told; }
 const sensor::Camera& SynthSource::true_camera() const { return impl_->camera; }
 std::size_t SynthSource::size() const { return impl_->frames.size(); }
+std::size_t SynthSource::round() const { return impl_->round; }
 
 dataset::PairInfo SynthSource::true_info(std::size_t index) const {
   const Stamps& at = impl_->frames.at(index);
@@ -406,7 +461,16 @@ core::Result<dataset::StoredPair> SynthSource::stored(std::size_t index) const {
     return core::input_error(fmt::format("{}: frame {} of {}", impl_->name, index, impl_->frames.size()));
   }
 
-  const Stamps& at = impl_->frames[index];
+  const std::size_t first = index % impl_->round;
+  if (impl_->kept == nullptr) return rendered(index);
+  if (auto pair = impl_->kept->find(first)) return std::move(*pair);
+  dataset::StoredPair pair = rendered(index);
+  if (first + impl_->round < size()) impl_->kept->keep(first, pair);
+  return pair;
+}
+
+dataset::StoredPair SynthSource::rendered(std::size_t index) const {
+  const Stamps& at = impl_->first_of(index);
   dataset::StoredPair pair;
   pair.color.pixels = impl_->color(at);
   if (blind(index)) {
@@ -463,18 +527,37 @@ PathMotion SynthSource::motion(double stamp, const Rigid3& camera_from_frame) co
 
 const Rigid3& SynthSource::body_from_camera() const { return impl_->body_from_camera; }
 double SynthSource::start() const { return kFirstStamp; }
-const std::vector<Event>& SynthSource::events() const { return impl_->world->events; }
+const std::vector<Event>& SynthSource::events() const { return impl_->events; }
+
+std::vector<DoorSwing> SynthSource::swings() const {
+  std::vector<DoorSwing> out;
+  const double end = impl_->frames.back().color - kFirstStamp;
+  const double once = impl_->kept ? impl_->path->duration() : end;
+  for (const MovingDoor& door : impl_->world->scene.moving_doors) {
+    for (int round = 0; round * once < end; ++round) {
+      for (const double start : door.starts) {
+        for (const bool back : {false, true}) {
+          const double at = round * once + start + (back ? door.swing + door.hold : 0.0);
+          if (start < once && at < end)
+            out.push_back({door.opening, kFirstStamp + at, kFirstStamp + at + door.swing,
+                           back ? door.rest_rad : door.other_rad});
+        }
+      }
+    }
+  }
+  return out;
+}
 
 cv::Mat1b SynthSource::moving(std::size_t index) const {
   const World& world = *impl_->world;
   if (world.movers.empty()) return {};
-  const double stamp = impl_->frames.at(index).color;
+  const double stamp = impl_->first_of(index).color;
   const View view = look(world, impl_->camera.color, impl_->pose(stamp), stamp - kFirstStamp);
   return cv::Mat1b(view.ids >= static_cast<int>(world.fixed_faces));
 }
 
 ExactFrame SynthSource::exact(std::size_t index) const {
-  const Stamps& at = impl_->frames.at(index);
+  const Stamps& at = impl_->first_of(index);
   ExactFrame out;
   out.world_from_depth = impl_->pose(at.depth);
   const View view = look(*impl_->world, impl_->depth_camera(), out.world_from_depth, at.depth - kFirstStamp);
@@ -484,7 +567,7 @@ ExactFrame SynthSource::exact(std::size_t index) const {
 }
 
 bool SynthSource::blind(std::size_t index) const {
-  const double stamp = impl_->frames.at(index).depth;
+  const double stamp = impl_->first_of(index).depth;
   return impl_->event(EventKind::kNoDepth, stamp) != 0.0 || impl_->event(EventKind::kCover, stamp) != 0.0;
 }
 

@@ -38,6 +38,8 @@ std::string describe_events(const SynthSource& source) {
     text += fmt::format("{},{:.6f},{:.6f},{}\n", to_string(e.kind), source.start() + e.start_s,
                         source.start() + e.start_s + e.duration_s, e.value);
   }
+  for (const DoorSwing& s : source.swings())
+    text += fmt::format("door {},{:.6f},{:.6f},{:.3f}\n", s.opening, s.from, s.to, s.open_rad * 180.0 / M_PI);
   return text;
 }
 

@@ -133,12 +133,21 @@ CameraPath::CameraPath(const RobotPath& robot, const Options& options) : closed_
                       a.pitch + s * (b.pitch - a.pitch), a.waypoint});
   }
 
+  if (options.frame_s > 0.0) {
+    duration_ = options.frame_s * std::max(1.0, std::round(duration_ / options.frame_s));
+    step_ = duration_ / static_cast<double>(count);
+  }
   start_ = options.start_share * duration_;
   for (const Event& e : options.events) {
     if (e.kind == EventKind::kSpin) spins_.push_back(e);
   }
 
   add_sway(options);
+  if (options.frame_s <= 0.0) return;
+  const double once = 2.0 * M_PI / duration_;
+  for (auto& axis : sway_) {
+    for (Sine& s : axis) s.frequency = once * std::max(1.0, std::round(s.frequency / once));
+  }
 }
 
 void CameraPath::add_sway(const Options& options) {
@@ -242,6 +251,19 @@ Rigid3 CameraPath::world_from_camera(double t) const {
   pose.rotation = pose.rotation * Eigen::AngleAxisd(p * sway(3, t), Vector3d::UnitZ()).toRotationMatrix();
   pose.translation = position;
   return pose;
+}
+
+CameraPath camera_path(const Scene& scene, const SynthOptions& options, const std::vector<Event>& events,
+                       int driver) {
+  CameraPath::Options motion;
+  motion.speed = options.speed;
+  motion.wheeled = (options.motion == Motion::kScene ? scene.motion : options.motion) == Motion::kWheeled;
+  motion.seed = mix(static_cast<std::uint64_t>(options.seed), static_cast<std::uint64_t>(driver) + 1);
+  const auto index = static_cast<std::size_t>(driver), paths = scene.robots.size();
+  motion.start_share = 0.381966 * static_cast<double>(index / paths);
+  motion.events = events;
+  motion.frame_s = options.repeat > 1 ? 1.0 / options.fps : 0.0;
+  return {scene.robots[index % paths], motion};
 }
 
 }  // namespace plumbline::synth

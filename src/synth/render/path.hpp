@@ -22,7 +22,8 @@ class CameraPath {
     double speed = 1.0;  ///< times the path's own
     bool wheeled = false;
     std::uint64_t seed = 1;
-    double start_share = 0.0;   ///< of a round, where to begin
+    double start_share = 0.0;  ///< of a round, where to begin
+    double frame_s = 0.0;      ///< > 0: rounds take whole multiples of it and are all the same, sway included
     std::vector<Event> events;  ///< kSpin is motion; others are ignored
   };
   CameraPath(const RobotPath& robot, const Options& options);
@@ -59,5 +60,10 @@ class CameraPath {
   std::vector<Event> spins_;
   std::vector<Sine> sway_[6];  ///< x y z in metres (world), roll pitch yaw in radians (camera)
 };
+
+/// The path of a camera's driver, robot `driver` of a scene: if there are more than paths, the next ones
+/// start further along. Spins are those of `events`.
+CameraPath camera_path(const Scene& scene, const SynthOptions& options, const std::vector<Event>& events,
+                       int driver);
 
 }  // namespace plumbline::synth

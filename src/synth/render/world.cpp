@@ -32,6 +32,15 @@ World::World(Scene s, SynthOptions o) : scene(std::move(s)), options(std::move(o
       movers.push_back({i, part, first, scene.faces.size() - first});
     }
   }
+  gone.assign(fixed_faces, 0);
+  for (std::size_t i = 0; i < scene.moving_doors.size(); ++i) {
+    const DoorLeaf& leaf = scene.leaves[scene.moving_doors[i].leaf];
+    movers.push_back({i, -1, scene.faces.size(), leaf.count});
+    for (std::size_t k = leaf.first; k < leaf.first + leaf.count; ++k) {
+      gone[k] = 1;
+      scene.faces.push_back(Face(scene.faces[k]));
+    }
+  }
   for (const Face& face : scene.faces) materials.push_back(find_material(face.material));
   build_bvh();
 }
@@ -53,6 +62,7 @@ void World::build_bvh() {
 
   std::size_t vertices = 0, triangles = 0;
   for (std::size_t i = 0; i < fixed_faces; ++i) {
+    if (gone[i] != 0) continue;
     vertices += scene.faces[i].polygon.size();
     triangles += scene.faces[i].polygon.size() - 2;
   }
@@ -66,6 +76,7 @@ void World::build_bvh() {
 
   unsigned base = 0;
   for (std::size_t i = 0; i < fixed_faces; ++i) {
+    if (gone[i] != 0) continue;
     const Face& face = scene.faces[i];
     for (const Eigen::Vector2d& uv : face.polygon) {
       const Vector3d p = face.at(uv.x(), uv.y());
@@ -87,6 +98,24 @@ void World::build_bvh() {
   rtcAttachGeometry(bvh_, geometry);
   rtcReleaseGeometry(geometry);
   rtcCommitScene(bvh_);
+}
+
+const World::Mover* World::mover_of(int face) const {
+  const auto index = static_cast<std::size_t>(std::max(0, face));
+  const auto found = std::find_if(movers.begin(), movers.end(), [&](const Mover& m) {
+    return index >= m.first && index < m.first + m.count;
+  });
+  return found == movers.end() ? nullptr : &*found;
+}
+
+geometry::Rigid3 World::motion(const Mover& mover, double t) const {
+  if (mover.part >= 0) return walker_motion(scene.walkers[mover.which], mover.part, t);
+  const MovingDoor& door = scene.moving_doors[mover.which];
+  const DoorLeaf& leaf = scene.leaves[door.leaf];
+  geometry::Rigid3 swung;
+  swung.rotation = Eigen::AngleAxisd(leaf.open_rad - door.angle(t), Vector3d::UnitZ()).toRotationMatrix();
+  swung.translation = leaf.hinge - swung.rotation * leaf.hinge;
+  return swung;
 }
 
 Hit World::cast(const Vector3d& origin, const Vector3d& direction, double far) const {
@@ -218,7 +247,12 @@ core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const
     }
   }
 
+  if (options.moving_doors > 0 && !scene.plan) {
+    return core::usage_error(fmt::format(
+        "moving_doors: doors swing in worlds made from a number (layout), not in scene '{}'", scene.name));
+  }
   Scene peopled = scene;
+  choose_moving_doors(options, peopled);
   if (!add_people(options.walkers, options.seed, peopled)) {
     return core::usage_error(
         fmt::format("walkers: scene '{}' has {}, not {}, and no free floor near its first path for more; ask "

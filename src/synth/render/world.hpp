@@ -54,17 +54,19 @@ class World {
   World(const World&) = delete;
   World& operator=(const World&) = delete;
 
-  /// Faces [first, first + count) of the scene walk: they are where the walk begins and move with the time.
+  /// Faces [first, first + count) of the scene walk or swing: they are where that begins and move with the
+  /// time.
   struct Mover {
-    std::size_t walker = 0;  ///< index into Scene::walkers
-    int part = 0;
+    std::size_t which = 0;  ///< index into Scene::walkers or Scene::moving_doors
+    int part = 0;           ///< of a walker; -1: a door
     std::size_t first = 0;
     std::size_t count = 0;
   };
 
-  Scene scene;  ///< its own faces, then those of the walkers
+  Scene scene;  ///< its own faces, then those of the walkers and moving doors
   SynthOptions options;
   std::size_t fixed_faces = 0;  ///< the scene's own; only these are cast against
+  std::vector<char> gone;       ///< of these: 1 where a moving door was, which is a mover instead
   std::vector<Mover> movers;
   std::vector<Event> events;               ///< of scene and options
   std::vector<const Material*> materials;  ///< per face
@@ -89,9 +91,9 @@ class World {
   /// kPacket rays from one origin; faces[k] = -1 for nothing. dx, dy, dz: directions.
   void cast_packet(const float origin[3], const float* dx, const float* dy, const float* dz,
                    int* faces) const;
-  [[nodiscard]] geometry::Rigid3 motion(const Mover& mover, double t) const {
-    return walker_motion(scene.walkers[mover.walker], mover.part, t);
-  }
+  [[nodiscard]] geometry::Rigid3 motion(const Mover& mover, double t) const;
+  /// The mover that a face belongs to; null: it is fixed.
+  [[nodiscard]] const Mover* mover_of(int face) const;
   /// True if a point lies inside a solid.
   [[nodiscard]] bool inside_solid(const Eigen::Vector3d& point) const;
 

@@ -15,6 +15,8 @@ namespace plumbline::synth {
 
 void SynthOptions::declare(core::OptionTable& table) {
   table.integer("frames", frames, {-1, 1000000}, "", "Frames of each robot; -1 = the path once");
+  table.integer("repeat", repeat, {1, 1000}, "",
+                "Rounds of the path: one is rendered, the others are its frames again with later stamps");
   table.integer("robots", robots, {1, 64}, "", "Number of recordings");
   table.integer(
       "layout", layout, {-1, 2147483647}, "",
@@ -27,6 +29,7 @@ void SynthOptions::declare(core::OptionTable& table) {
       "Rooms alike in an office or on each storey of a building: the same walls and furniture, their "
       "own posters");
   table.integer("copies", copies, {0, 12}, "", "The same with the same posters");
+  table.boolean("hall", hall, "One room of an office, or of a building's lowest storey, is 20 m long");
 
   table.choice(
       "path", path,
@@ -42,6 +45,10 @@ void SynthOptions::declare(core::OptionTable& table) {
       "changes", changes,
       "The same world another day: a seed, or a YAML file of edits; what has changed is in changes.json");
 
+  table.integer(
+      "moving_doors", moving_doors, {0, 40}, "",
+      "At most so many doors of a world made from a number swing while it is filmed; events.csv tells "
+      "when");
   table.integer("walkers", walkers, {0, 20}, "",
                 "Number of people who walk about: filmed, but no part of reference.ply");
 

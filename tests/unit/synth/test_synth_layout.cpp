@@ -338,6 +338,28 @@ TEST(SynthLayoutNumbers, LikeRoomsDifferInPostersOnlyAndCopiesInNothing) {
   }
 }
 
+TEST(SynthLayoutNumbers, HallsOf20MetresCanBeWalked) {
+  for (const char* kind : {"office", "building"}) {
+    for (int number = 0; number < 8; ++number) {
+      SynthOptions options;
+      options.layout = number;
+      options.floors = 2;
+      options.hall = true;
+      const auto scene = make_layout(kind, options);
+      ASSERT_TRUE(scene) << scene.error().message;
+      check_rooms(*scene);
+      check_openings(*scene);
+      check_ways(*scene);
+      const auto& rooms = scene->plan->rooms;
+      EXPECT_TRUE(std::any_of(rooms.begin(), rooms.end(), [](const PlanRoom& room) {
+        Eigen::AlignedBox2d box;
+        for (const Vector2d& p : room.outline()) box.extend(p);
+        return room.kind == "hall" && box.sizes().maxCoeff() >= 20.0;
+      })) << scene->name;
+    }
+  }
+}
+
 TEST(SynthLayoutNumbers, SceneWithoutLayoutsIsRefused) {
   SynthOptions options;
   options.layout = 3;

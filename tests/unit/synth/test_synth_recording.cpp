@@ -8,6 +8,8 @@
 
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
+#include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/synth/layout.hpp"
 #include "plumbline/synth/recording.hpp"
 #include "plumbline/synth/source.hpp"
 
@@ -139,6 +141,94 @@ TEST_F(SynthRecording, StopsInOrderAndRefusesToOverwrite) {
   const auto nowhere = write(1, "/proc/no/such/place");
   ASSERT_FALSE(nowhere);
   EXPECT_EQ(nowhere.error().kind, core::ErrorKind::kOutput);
+}
+
+TEST_F(SynthRecording, RoundsThatRepeatAreTheFirstOneLater) {
+  options_.layout = 1;
+  options_.path = Route::kLaps;
+  options_.robots = 1;
+  options_.frames = -1;
+  options_.repeat = 3;
+  options_.fps = 1.0;
+  options_.events = "lampoff@2+1,drop@4+1";
+  const auto scene = make_layout("home", options_);
+  ASSERT_TRUE(scene) << scene.error().message;
+  const core::Executor executor(2);
+  const auto source = SynthSource::create(*build_world(*scene, options_, executor), 0);
+  ASSERT_TRUE(source) << source.error().message;
+  const SynthSource& film = **source;
+  const std::size_t round = film.round();
+  ASSERT_EQ(film.size(), 3 * round);
+  const double seconds = static_cast<double>(round + 1);  // with the dropped frame
+
+  for (const std::size_t i : {std::size_t{0}, round / 2, round - 1}) {
+    EXPECT_NEAR(film.info(i + 2 * round).stamp - film.info(i).stamp, 2.0 * seconds, 2e-6);
+    const auto first = film.stored(i), later = film.stored(i + 2 * round);
+    EXPECT_EQ(cv::norm(first->color.pixels, later->color.pixels, cv::NORM_INF), 0.0);
+    EXPECT_EQ(cv::norm(first->depth.pixels, later->depth.pixels, cv::NORM_INF), 0.0);
+    EXPECT_EQ(cv::norm(first->color.pixels, film.rendered(i + round).color.pixels, cv::NORM_INF), 0.0);
+    const geometry::Rigid3 gone = film.world_from_camera(film.info(i).stamp).inverse() *
+                                  film.world_from_camera(film.info(i + 2 * round).stamp);
+    EXPECT_LT(gone.translation.norm(), 1e-5);
+    EXPECT_LT(geometry::log_so3(gone.rotation).norm(), 1e-5);
+  }
+
+  // The seam is as smooth as the path.
+  const PathMotion seam = film.motion(film.start() + seconds);
+  EXPECT_LT(seam.acceleration.norm(), 5.0);
+  EXPECT_EQ(film.events().size(), 6U);
+
+  // Files of later rounds are those of the first.
+  const auto log = core::null_log();
+  options_.moving_masks = true;
+  const auto summary = write_recordings(*scene, options_, folder_, executor, {}, *log, {});
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_EQ(summary->frames, 3 * round);
+  std::size_t pictures = 0;
+  for ([[maybe_unused]] const auto& file : fs::directory_iterator(folder_ / "robot0/rgb")) ++pictures;
+  EXPECT_EQ(pictures, 3 * round);
+
+  // A path that does not close has no rounds.
+  Scene open = *scene;
+  open.robots[0].closed = false;
+  const auto refused = build_world(open, options_, executor);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("closed: true"), std::string::npos) << refused.error().message;
+}
+
+TEST_F(SynthRecording, DoorsSwingWhileNoCameraIsNear) {
+  std::size_t doors = 0;
+  for (int number = 0; number < 4; ++number) {
+    options_.layout = number;
+    options_.robots = 1;
+    options_.frames = 600;
+    options_.fps = 10.0;
+    options_.moving_doors = 3;
+    Scene scene = *make_layout("office", options_);
+    choose_moving_doors(options_, scene);
+    EXPECT_LE(scene.moving_doors.size(), 3U);
+    const core::Executor executor(1);
+    const auto source = SynthSource::create(*build_world(scene, options_, executor), 0);
+    ASSERT_TRUE(source) << source.error().message;
+
+    for (const MovingDoor& door : scene.moving_doors) {
+      const double start = door.starts.front();
+      EXPECT_EQ(door.angle(0.0), door.rest_rad);
+      EXPECT_NEAR(door.angle(start + door.swing + 0.5 * door.hold), door.other_rad, 1e-9);
+      EXPECT_NEAR(door.angle(start + 2.0 * door.swing + door.hold), door.rest_rad, 1e-9);
+      EXPECT_GT(std::abs(door.other_rad - door.rest_rad), 0.39);
+      const Eigen::Vector3d hinge = scene.leaves[door.leaf].hinge;
+      for (int i = 0; i < 10; ++i) {
+        const double t = start + 0.1 * i * (2.0 * door.swing + door.hold);
+        const Eigen::Vector3d eye = (*source)->world_from_camera((*source)->start() + t).translation - hinge;
+        EXPECT_GT(eye.head<2>().norm(), 1.0);
+      }
+    }
+    doors += scene.moving_doors.size();
+    const auto swings = (*source)->swings();
+    EXPECT_EQ(swings.empty(), scene.moving_doors.empty());
+  }
+  EXPECT_GT(doors, 1U);
 }
 
 }  // namespace
