@@ -2,14 +2,14 @@
 #pragma once
 
 // Frames of a round of a camera's path, packed in memory for the rounds that follow. Private to the module.
+#include <algorithm>
 #include <array>
 #include <mutex>
-#include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <vector>
 
+#include "plumbline/core/packing.hpp"
 #include "plumbline/dataset/frame_source.hpp"
-#include "plumbline/dataset/image_io.hpp"
 
 namespace plumbline::synth {
 
@@ -25,24 +25,41 @@ class KeptRound {
       const std::lock_guard<std::mutex> lock(mutex_);
       packed = frames_[index];
     }
-    if (packed[0].empty()) return std::nullopt;
+    if (packed[0].bytes.empty()) return std::nullopt;
     dataset::StoredPair pair;
-    pair.color.pixels = cv::imdecode(packed[0], cv::IMREAD_UNCHANGED);
-    pair.depth.pixels = cv::imdecode(packed[1], cv::IMREAD_UNCHANGED);
+    pair.color.pixels = packed[0].image();
+    pair.depth.pixels = packed[1].image();
     return pair;
   }
 
   void keep(std::size_t index, const dataset::StoredPair& pair) {
-    auto color = dataset::encode_png(pair.color.pixels, 1), depth = dataset::encode_png(pair.depth.pixels, 1);
-    if (!color || !depth) return;
+    Packed packed{PackedImage(pair.color.pixels), PackedImage(pair.depth.pixels)};
+    const std::size_t size = packed[0].bytes.size() + packed[1].bytes.size();
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (!frames_[index][0].empty() || bytes_ + color->size() + depth->size() > kMostBytes) return;
-    bytes_ += color->size() + depth->size();
-    frames_[index] = {std::move(*color), std::move(*depth)};
+    if (!frames_[index][0].bytes.empty() || bytes_ + size > kMostBytes) return;
+    bytes_ += size;
+    frames_[index] = std::move(packed);
   }
 
  private:
-  using Packed = std::array<std::vector<std::uint8_t>, 2>;  ///< PNG: colour, depth; empty: not kept
+  struct PackedImage {
+    PackedImage() = default;
+    explicit PackedImage(const cv::Mat& image) : size(image.size()), type(image.type()) {
+      const cv::Mat whole = image.isContinuous() ? image : image.clone();
+      bytes = core::pack(core::Bytes(whole.data, whole.data + whole.total() * whole.elemSize()));
+    }
+    [[nodiscard]] cv::Mat image() const {
+      cv::Mat image(size, type);
+      const core::Bytes whole = core::unpack(bytes.data(), bytes.size());
+      std::copy(whole.begin(), whole.end(), image.data);
+      return image;
+    }
+    cv::Size size;
+    int type = 0;
+    core::Bytes bytes;  ///< empty: not kept
+  };
+  using Packed = std::array<PackedImage, 2>;  ///< colour, depth
+
   mutable std::mutex mutex_;
   std::vector<Packed> frames_;
   std::size_t bytes_ = 0;
