@@ -83,8 +83,8 @@ using CameraEstimates = std::vector<std::pair<std::int32_t, CameraEstimate>>;  /
 
 template <typename Io>
 void fields(Io& io, RobotInfo& robot) {
-  io(robot.number, robot.name,
-     robot.camera);  // versions and estimates have rows of their own, that come later
+  // Versions and estimates have rows of their own, that come later.
+  io(robot.number, robot.name, robot.camera);
 }
 
 template <typename Io>

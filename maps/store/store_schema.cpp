@@ -150,6 +150,7 @@ StoreHeader read_header(Database& database) {
   header.program_version = get_text(database, "program");
   header.configuration = get_text(database, "configuration");
   header.format = static_cast<int>(database.number("PRAGMA user_version"));
+
   Statement robots(database, "SELECT data FROM header WHERE key = 'robots'");
   if (!robots.step()) throw BadBytes("its header has no robots");
   header.robots = decode<std::vector<RobotInfo>>(robots.unpacked(0));

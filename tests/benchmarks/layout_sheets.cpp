@@ -19,7 +19,7 @@ using namespace plumbline;
 
 constexpr int kPlan = 128, kView = 160, kTall = 120, kText = 12, kColumns = 4, kRows = 5;  // px; sheets
 
-/// The lowest storey from above with the path, the middle view of the path, and numbers below.
+/// The lowest storey from above with the path, a picture of the camera's, and numbers below.
 cv::Mat3b tile(const std::string& kind, int number) {
   synth::SynthOptions options;
   options.layout = number;
@@ -29,6 +29,7 @@ cv::Mat3b tile(const std::string& kind, int number) {
   options.fps = 2.0;
   const auto scene = synth::make_layout(kind, options);
   if (!scene) throw std::runtime_error(scene.error().message);
+
   const synth::Plan& plan = *scene->plan;
   cv::Mat3b out(kTall + kText, kPlan + kView, {255, 255, 255});
 
@@ -38,6 +39,7 @@ cv::Mat3b tile(const std::string& kind, int number) {
     for (const auto& p : room.outline()) box.extend(p);
     area += room.area();
   }
+
   const double scale = std::min((kPlan - 8) / box.sizes().x(), (kTall - 8) / box.sizes().y());
   const auto pixel = [&](const Eigen::Vector2d& p) {
     return cv::Point(4 + static_cast<int>(scale * (p.x() - box.min().x())),
@@ -56,12 +58,14 @@ cv::Mat3b tile(const std::string& kind, int number) {
   for (const auto& room : plan.rooms) {
     if (room.storey == 0) shape(room.outline(), {235, 235, 235});
   }
+
   // Walls are thinner than a pixel.
   for (const auto& room : plan.rooms) {
     const auto outline = room.outline();
     for (std::size_t i = 0; room.storey == 0 && i < outline.size(); ++i)
       cv::line(out, pixel(outline[i]), pixel(outline[(i + 1) % outline.size()]), {60, 60, 60}, 1);
   }
+
   for (const auto& o : plan.openings) {
     const auto& wall = plan.walls[static_cast<std::size_t>(o.wall)];
     if (plan.rooms[static_cast<std::size_t>(o.front)].storey == 0 && o.back >= 0)
@@ -76,6 +80,7 @@ cv::Mat3b tile(const std::string& kind, int number) {
   if (!world) throw std::runtime_error(world.error().message);
   const auto source = synth::SynthSource::create(*world, 0);
   if (!source) throw std::runtime_error(source.error().message);
+
   const geometry::Trajectory way = *(*source)->truth();
   for (std::size_t i = 1; i < way.size(); ++i) {
     if (way[i].world_from_camera.translation.z() < 2.3)
@@ -103,11 +108,13 @@ int main(int count, char** words) {
       const cv::Mat3b one = tile(building ? "building" : kind, building ? i - 10 : i);
       one.copyTo(sheet(cv::Rect(i % kColumns * one.cols, i / kColumns * one.rows, one.cols, one.rows)));
     }
+
     // Few colours make small files.
     for (cv::Vec3b& pixel : sheet) {
       for (int k = 0; k < 3; ++k)
         pixel[k] = static_cast<std::uint8_t>(std::min(255, (pixel[k] + 8) / 16 * 16));
     }
+
     const auto bytes = dataset::encode_png(sheet, 9);
     if (!bytes) return 1;
     std::FILE* file = std::fopen((folder / fmt::format("layouts_{}.png", kind)).c_str(), "wb");

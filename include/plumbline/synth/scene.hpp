@@ -104,14 +104,13 @@ struct DoorLeaf {
 
 /// A leaf that swings to another angle and back at times.
 struct MovingDoor {
-  std::size_t leaf = 0;    ///< index into Scene::leaves
-  int opening = 0;         ///< index into Plan::openings
-  double rest_rad = 0.0;   ///< how far it is open else
-  double other_rad = 0.0;  ///< where it swings to
-  double swing = 1.5;      ///< s that it takes to swing there, and back
-  double hold = 3.0;       ///< s that it stays there
-  std::vector<double>
-      starts;  ///< s after the first frame, rising; of the first round of a path that is repeated
+  std::size_t leaf = 0;        ///< index into Scene::leaves
+  int opening = 0;             ///< index into Plan::openings
+  double rest_rad = 0.0;       ///< how far it is open else
+  double other_rad = 0.0;      ///< where it swings to
+  double swing = 1.5;          ///< s that it takes to swing there, and back
+  double hold = 3.0;           ///< s that it stays there
+  std::vector<double> starts;  ///< s after the first frame, rising; of the first round if there are several
 
   /// Angle from shut, t seconds after the first frame.
   [[nodiscard]] double angle(double t) const;

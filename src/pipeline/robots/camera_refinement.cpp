@@ -70,7 +70,7 @@ Json pair_of(const RobotInfo& a, const RobotInfo& b) {
   Json pair{{"a", a.name}, {"b", b.name}};
   if (size_a.width != size_b.width || size_a.height != size_b.height || a.camera.model != b.camera.model) {
     pair.update({{"agree", false}, {"chi2", nullptr}, {"sigmas", nullptr}, {"number", nullptr}});
-    pair["text"] = fmt::format("robots {} and {}: cameras differ in size or lens", a.name, b.name);
+    pair["text"] = fmt::format("the cameras of {} and {} differ in size or lens", a.name, b.name);
     return pair;
   }
 
@@ -88,8 +88,11 @@ Json pair_of(const RobotInfo& a, const RobotInfo& b) {
   const char* name = kNames.at(static_cast<std::size_t>(number));
   const bool agree = chi2 <= kMostChi2;
   pair.update({{"agree", agree}, {"chi2", rounded(chi2)}, {"sigmas", rounded(largest)}, {"number", name}});
-  pair["text"] = fmt::format("robots {} and {}: cameras {} by {:.1f} sigma in {}", a.name, b.name,
-                             agree ? "agree, they differ" : "differ", largest, name);
+  pair["text"] =
+      agree ? fmt::format("{} and {} may share one camera: no number differs by more than {:.1f} sigma",
+                          a.name, b.name, largest)
+            : fmt::format("{} and {} have different cameras: {} differs by {:.1f} sigma", a.name, b.name,
+                          name, largest);
   return pair;
 }
 
@@ -153,8 +156,8 @@ bool CameraRefinement::ask(const maps::Map& map, const std::vector<maps::FramePo
                           robot_.name, f.name, found->views, f.given, f.found, f.sigma, f.wrong));
   known_.note.clear();
 
-  const bool knows_less =
-      2 * found->views < known_.views;  // than the question before: a second pass has fewer frames
+  // A second pass has fewer frames: what it says may weigh less than the answer before.
+  const bool knows_less = 2 * found->views < known_.views;
   known_.views = std::max(known_.views, found->views);
   const bool better = !knows_less && found->news >= (known_.better ? kLaterNews : mapping::kFileIsWrong);
   if (known_.answers > 1 && !better) return false;

@@ -69,6 +69,7 @@ void RobotCameras::ask(std::size_t asked_at, const Slams& slams) {
   question_->cameras = cameras_;
   question_->better.resize(cameras_.size());
   question_->due = asked_at + kAnswerFrames;
+
   std::vector<std::pair<maps::Map, std::vector<maps::FramePose>>> maps;
   for (const auto& slam : slams) maps.emplace_back(slam->map(), slam->frame_poses());
   question_->job = executor_->submit([question = question_.get(), maps = std::move(maps), log = log_] {

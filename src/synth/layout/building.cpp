@@ -269,6 +269,7 @@ RobotPath plan_building_path(const Plan& plan, Route route, int robot, Rng& rng)
     const Plan part = storey_of(plan, k);
     const PlanRoom* stairs = stairs_of(part);
     if (stairs == nullptr) return {};
+
     if (!well) well.emplace(*stairs, floors > 1 ? plan.storeys[1] : 3.0);
     storeys.push_back(plan_path(part, furnished_ground(part, 0), route, robot, rng, well->entry()));
 

@@ -32,6 +32,8 @@ World::World(Scene s, SynthOptions o) : scene(std::move(s)), options(std::move(o
       movers.push_back({i, part, first, scene.faces.size() - first});
     }
   }
+
+  // Leaves that swing take the place of those that stand still.
   gone.assign(fixed_faces, 0);
   for (std::size_t i = 0; i < scene.moving_doors.size(); ++i) {
     const DoorLeaf& leaf = scene.leaves[scene.moving_doors[i].leaf];
@@ -41,6 +43,7 @@ World::World(Scene s, SynthOptions o) : scene(std::move(s)), options(std::move(o
       scene.faces.push_back(Face(scene.faces[k]));
     }
   }
+
   for (const Face& face : scene.faces) materials.push_back(find_material(face.material));
   build_bvh();
 }

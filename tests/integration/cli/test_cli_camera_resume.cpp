@@ -48,6 +48,7 @@ class CameraResume : public ProgramTest {
     }
 
     ASSERT_GT(child, 0);
+
     std::size_t next = 0;
     int status = 0;
     while (waitpid(child, &status, WNOHANG) == 0) {
@@ -79,6 +80,7 @@ TEST_F(CameraResume, ARunThatIsKilledAsksAndUsesItsCameraAsTheUndisturbedOne) {
                 .code,
             0);
   const std::string map = "world/robot0 -q --set output.views= --set output.pcd=off --set fuse.voxel=40mm";
+
   map_and_copy(map);
   if (HasFatalFailure()) return;
   const nlohmann::json whole = camera("whole");
@@ -89,6 +91,7 @@ TEST_F(CameraResume, ARunThatIsKilledAsksAndUsesItsCameraAsTheUndisturbedOne) {
     const std::string out = "out" + std::to_string(i);
     const Outcome o = run("map --resume -o " + out + " " + map);
     ASSERT_TRUE(o.code == 0 || o.code == 4) << out << o;
+
     const nlohmann::json resumed = camera(out);
     EXPECT_EQ(resumed["asked_at"], whole["asked_at"]) << out;
     EXPECT_EQ(resumed["from_frame"], whole["from_frame"]) << out;

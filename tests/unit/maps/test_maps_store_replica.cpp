@@ -75,6 +75,7 @@ TEST(StoreReplica, HoldsTheSameRowsWheneverItCaughtUp) {
   ASSERT_TRUE(writer) << writer.error().message;
   auto copy = StoreReplica::open(copied);
   ASSERT_TRUE(copy) << copy.error().message;
+
   for (int i = 0; i < 24; ++i) {
     const KeyframeId id = world.step();  // landmarks come and go
     for (const PointId p : world.map.point_ids()) {
@@ -87,6 +88,7 @@ TEST(StoreReplica, HoldsTheSameRowsWheneverItCaughtUp) {
     ASSERT_EQ(copy->keyframes(), world.map.keyframe_count());
     ASSERT_FALSE(copy->complete());
   }
+
   ASSERT_TRUE(writer->attach("robots", {1, 2, 3}));
   ASSERT_TRUE(writer->save_final(world.map, world.frames));
   EXPECT_GT(follow(folder.file(), *copy), 2);
@@ -96,9 +98,11 @@ TEST(StoreReplica, HoldsTheSameRowsWheneverItCaughtUp) {
   EXPECT_TRUE(std::any_of(removed.begin(), removed.end(), [](const std::string& line) {
     return line.rfind("removed|", 0) == 0;
   })) << "the world is too simple";
+
   EXPECT_EQ(store_heads(folder.file())->map, copy->heads().map);
   EXPECT_EQ(store_heads(folder.file())->clouds, copy->heads().clouds);
   EXPECT_EQ(follow(folder.file(), *copy), 0) << "there is nothing more to tell";
+
   const auto stored = load_map(copied);
   ASSERT_TRUE(stored) << stored.error().message;
   EXPECT_TRUE(equal(stored->map, world.map));
@@ -123,18 +127,21 @@ TEST(MapFollower, HasTheMapOfTheStoreAtEachMomentAndKeepsWhatItDecoded) {
     while (const auto next = next_transaction(folder.file(), StoreStream::kMap, follower.head()).value()) {
       ASSERT_TRUE(follower.apply(*next));
     }
+
     const auto map = follower.map();
     ASSERT_TRUE(map) << map.error().message;
     ASSERT_TRUE(equal(map->map, world.map)) << "after " << i;
     ASSERT_TRUE(equal(load_map(folder.file())->map, world.map)) << "after " << i;
     EXPECT_EQ(map->header.robots.front().camera.name, world.camera.name);
     EXPECT_EQ(follower.head(), store_heads(folder.file())->map);
+
     const KeyframeId id = world.map.keyframe_ids().front();
     if (!earlier.empty() && earlier.back().has_keyframe(id))
       kept += &earlier.back().keyframe(id) == &map->map.keyframe(id) ? 1 : 0;
     earlier.push_back(map->map);
   }
   EXPECT_GT(kept, 10) << "keyframes are decoded again";
+
   MapFollower late;
   const auto last = next_transaction(folder.file(), StoreStream::kMap, 3).value();
   ASSERT_TRUE(last);
