@@ -46,7 +46,8 @@ class SynthSource final : public dataset::FrameSource {
  public:
   /// Robot `robot` (from 0) of the scene. Errors: no frames, path through a solid (names the segment and the
   /// thing).
-  static core::Result<std::unique_ptr<SynthSource>> create(std::shared_ptr<const World> world, int robot);
+  static core::Result<std::unique_ptr<SynthSource>> create(const std::shared_ptr<const World>& world,
+                                                           int robot);
   ~SynthSource() override;
 
   [[nodiscard]] const std::string& name() const override;
@@ -93,7 +94,7 @@ class SynthSource final : public dataset::FrameSource {
  private:
   struct Impl;
   friend core::Result<void> check_paths(const std::shared_ptr<const World>& world);
-  static core::Result<std::unique_ptr<Impl>> plan(std::shared_ptr<const World> world, int robot);
+  static core::Result<std::unique_ptr<Impl>> plan(const std::shared_ptr<const World>& world, int robot);
   explicit SynthSource(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };

@@ -278,6 +278,7 @@ RobotPath plan_building_path(const Plan& plan, Route route, int robot, Rng& rng)
 
   RobotPath path = storeys.front();
   path.waypoints.clear();
+
   const auto tour = [&](int k) {
     for (Waypoint w : storeys[static_cast<std::size_t>(k)].waypoints) {
       const Vector3d lift(0.0, 0.0, plan.storeys[static_cast<std::size_t>(k)] + height - w.position.z());

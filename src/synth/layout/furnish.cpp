@@ -139,6 +139,7 @@ class Furnisher {
       const Vector2d way = plan_.rooms[static_cast<std::size_t>(like[i])].faces[0].from -
                            plan_.rooms[static_cast<std::size_t>(like[0])].faces[0].from;
       const Vector3d shift(way.x(), way.y(), 0.0);
+
       const std::size_t base = scene.objects.size();
       const auto name = [&](std::size_t object) {
         return fmt::format("{} {}", scene.objects[object].type, base + object - objects + 1);

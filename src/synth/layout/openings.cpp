@@ -294,6 +294,7 @@ bool make_alike(Plan& plan) {
   for (const int other : plan.alike) {
     if (other == first) continue;
     const Vector2d shift = room(other).faces[0].from - room(first).faces[0].from;
+
     for (std::size_t i = 0; i < count; ++i) {
       PlanOpening o = kept[i];
       if (o.front != first && o.back != first) continue;

@@ -149,6 +149,7 @@ std::string describe_changes(const Scene& scene) {
       changes.back()["factor"] = c.factor;
       continue;
     }
+
     changes.back().update({{"thing", c.thing},
                            {"with", c.with},
                            {"box_before_m", corners(c.before)},

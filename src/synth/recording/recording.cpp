@@ -129,6 +129,7 @@ Result<std::size_t> write_pictures(const Job& job) {
     std::vector<std::string> problems(count);
     job.executor.parallel_for(
         count, [&](std::size_t i) { problems[i] = write_pair(job.source, done + i, job.folder); });
+
     for (const std::string& problem : problems) {
       if (!problem.empty()) return core::output_error(problem);
     }

@@ -112,7 +112,10 @@ core::Result<void> SynthSource::Impl::check_way() const {
   Vector3d here = first;
   const double once = std::min(end, 2.0 * path->duration() + 60.0);  // later rounds repeat the first
 
-  for (double t = 0.02; t <= once; t += 0.02) {
+  constexpr double kStep = 0.02;  // s
+  const auto steps = static_cast<int>(once / kStep);
+  for (int i = 1; i <= steps; ++i) {
+    const double t = i * kStep;
     const Vector3d to = at(t).translation;
     const Vector3d step = to - here;
     const double length = step.norm();
@@ -156,7 +159,7 @@ SynthSource::SynthSource(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 SynthSource::~SynthSource() = default;
 
 /// Everything that needs no picture: motion, stamps, and the check of the path.
-core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_ptr<const World> world,
+core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(const std::shared_ptr<const World>& world,
                                                                    int robot) {
   const SynthOptions& o = world->options;
   if (auto ok = check(o); !ok) return tl::unexpected<core::Error>(ok.error());
@@ -215,9 +218,9 @@ core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_p
   return impl;
 }
 
-core::Result<std::unique_ptr<SynthSource>> SynthSource::create(std::shared_ptr<const World> world,
+core::Result<std::unique_ptr<SynthSource>> SynthSource::create(const std::shared_ptr<const World>& world,
                                                                int robot) {
-  auto planned = plan(std::move(world), robot);
+  auto planned = plan(world, robot);
   if (!planned) return tl::unexpected<core::Error>(planned.error());
   std::unique_ptr<Impl> impl = std::move(*planned);
   impl->marks =

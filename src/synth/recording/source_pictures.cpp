@@ -43,6 +43,7 @@ cv::Mat2f SynthSource::Impl::flow(const View& view, const Stamps& at, double ext
   cv::Mat2f out(h, w);
 
   const double angle = Rng(seed, 0xb1 + static_cast<std::uint64_t>(at.number / 15)).uniform(0.0, 2.0 * M_PI);
+
   for (int j = 0; j < h; ++j) {
     for (int i = 0; i < w; ++i) {
       const int x = std::min(8 * i + 4, view.ids.cols - 1), y = std::min(8 * j + 4, view.ids.rows - 1);
@@ -61,6 +62,7 @@ cv::Mat2f SynthSource::Impl::flow(const View& view, const Stamps& at, double ext
                    ? p
                    : world->motion(*mover, now + dt) * (world->motion(*mover, now).inverse() * p);
       };
+
       const Eigen::Vector2d d = view.camera.project(later * at_time(0.5 * exposure)) -
                                 view.camera.project(sooner * at_time(-0.5 * exposure));
       out(j, i) = {static_cast<float>(d.x() + extra_px * std::cos(angle)),

@@ -167,6 +167,7 @@ MovingFaces::MovingFaces(const World& world, const View& view, double t) : world
         box |= cv::Rect(static_cast<int>(std::clamp(pixel.x(), -1e6, 1e6)) - 2,
                         static_cast<int>(std::clamp(pixel.y(), -1e6, 1e6)) - 2, 5, 5);
       };
+
       Vector3d before =
           camera_from_world * (motion * face.at(face.polygon.back().x(), face.polygon.back().y()));
       for (const Eigen::Vector2d& uv : face.polygon) {
