@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Verifies other keyframes that should see the same place if the relative pose of two maps is right.
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <utility>
 
@@ -17,8 +18,10 @@ struct Reach {
   double near_m;
   double turned_rad;
 };
-constexpr Reach kMust{0.7, 0.45};  // they do
-constexpr Reach kMay{1.5, 0.7};    // most do, unless something stands between them
+constexpr Reach kMust{0.7, 0.45};          // they do
+constexpr double kConfirmed = 0.75;        // of the keyframes that see one place
+constexpr double kConfirmedByLike = 0.45;  // of those that see one that looks alike in part
+constexpr Reach kMay{1.5, 0.7};            // most do, unless something stands between them
 
 /// The keyframe of a whose view should be most like that of a camera of b; invalid: none is.
 KeyframeId nearest_view(const maps::Map& a, const Rigid3& a_from_b, const Rigid3& b_from_camera,
@@ -121,6 +124,9 @@ CrossValidation cross_validate(const PartPair& maps, const std::vector<VerifiedP
     result.pairs.push_back(fresh.pairs[i]);
   }
 
+  const double missed = result.expected - result.confirmed;
+  result.against_like = result.confirmed * std::log(kConfirmed / kConfirmedByLike) +
+                        missed * std::log((1.0 - kConfirmed) / (1.0 - kConfirmedByLike));
   return result;
 }
 

@@ -134,19 +134,16 @@ MapFusionOptions::MapFusionOptions() {
 }
 
 void MapFusionOptions::declare_decision(core::OptionTable& table, const std::string& prefix) {
-  table.integer(prefix + "min_pairs", min_pairs, {2, 1000}, "",
-                "Smallest number of keyframes of each of two maps that agree on their relative pose");
-  table.integer(prefix + "few_pairs", few_pairs, {1, 1000}, "",
-                "This many keyframes suffice if they share few_inliers features and no other answer fits");
-  table.integer(prefix + "few_inliers", few_inliers, {1, 10000}, "",
-                "Smallest number of features that few_pairs keyframes share; lines count twice");
+  table.integer(
+      prefix + "min_pairs", min_pairs, {2, 1000}, "",
+      "If fewer keyframes of each of two maps agree on their relative pose, more around them are verified");
   table.number(prefix + "few_extent", few_extent_m, {0.0, 1000.0}, "m",
                "Smallest extent of both maps along a direction that no surface constrains, to detect "
                "repeated structure");
 
   table.number(prefix + "min_span", min_span_m, {0.0, 100.0}, "m",
-               "Smallest distance between the keyframes that agree");
-  table.number(prefix + "min_turn", min_span_rad, {0.0, 3.2}, "rad", "Or smallest rotation between them");
+               "Keyframes that agree count as one if they are nearer to one another than this");
+  table.number(prefix + "min_turn", min_span_rad, {0.0, 3.2}, "rad", "And turned by less than this");
   table.number(prefix + "max_translation", consistency.max_apart_m, {0.0, 10.0}, "m",
                "Largest distance between the alignments of two pairs that agree");
   table.number(prefix + "max_rotation", consistency.max_turned_rad, {0.0, 3.2}, "rad",
@@ -154,12 +151,10 @@ void MapFusionOptions::declare_decision(core::OptionTable& table, const std::str
   table.number(prefix + "drift", consistency.apart_per_metre, {0.0, 1.0}, "",
                "Additional distance per metre between the pairs, for drift");
 
-  table.number(prefix + "max_alternative", alternative, {0.0, 1.0}, "",
-               "Share of the best answer's keyframes from which a second answer makes both doubtful");
-  table.number(prefix + "max_seen_through", max_seen_through, {0.0, 1.0}, "",
-               "Share of landmarks seen through from which such an answer is ruled out");
-  table.number(prefix + "min_confirmed", min_confirmed, {0.0, 1.0}, "",
-               "Smallest share of the keyframes with a view of the other map that must confirm it");
+  table.number(prefix + "prior_shared", prior_shared, {0.001, 0.999}, "",
+               "Probability that two maps share a place, before anything is compared");
+  table.number(prefix + "prior_wrong", prior_wrong, {1e-12, 0.5}, "",
+               "Largest probability of a merge that is wrong");
   table.integer(prefix + "verifications", verifications, {1, 100000}, "",
                 "Largest number of pairs of keyframes to verify for each two maps");
   table.boolean(prefix + "robust", robust, "Let the pose graph reject wrong pairs of keyframes");

@@ -38,24 +38,19 @@ double turn_between(const maps::Map& map, const std::vector<PlacePair>& pairs) {
   return most;
 }
 
-/// Points and lines (twice) in common: of each keyframe that agrees its best pair, on the side where that is
-/// less.
-int in_common(const maps::Map& a, const Consistency& consistency) {
-  std::map<KeyframeId, int> of_a;
-  std::map<KeyframeId, int> of_b;
-  for (const VerifiedPair& pair : consistency.pairs) {
-    const int inliers = pair.evidence.points + 2 * pair.evidence.lines;
-    const bool query_of_a = a.has_keyframe(pair.query);
-    int& best_a = of_a[query_of_a ? pair.query : pair.match];
-    int& best_b = of_b[query_of_a ? pair.match : pair.query];
-    best_a = std::max(best_a, inliers);
-    best_b = std::max(best_b, inliers);
+/// Number of places at which keyframes of b agree: of those near one another one counts.
+int places_of(const maps::Map& map, const std::vector<PlacePair>& pairs, const MapFusionOptions& options) {
+  std::vector<Rigid3> places;
+  for (const PlacePair& pair : pairs) {
+    const Rigid3 world_from_camera = map.camera_from_world(pair.b).inverse();
+    const auto same = [&](const Rigid3& other) {
+      return (other.translation - world_from_camera.translation).norm() < options.min_span_m &&
+             geometry::rotation_angle(other.rotation.transpose() * world_from_camera.rotation) <
+                 options.min_span_rad;
+    };
+    if (std::none_of(places.begin(), places.end(), same)) places.push_back(world_from_camera);
   }
-  const auto sum = [](const std::map<KeyframeId, int>& best) {
-    return std::accumulate(best.begin(), best.end(), 0,
-                           [](int all, const auto& one) { return all + one.second; });
-  };
-  return std::min(sum(of_a), sum(of_b));
+  return static_cast<int>(places.size());
 }
 
 std::string objection(const PartPair& maps, const Consistency& consistency, const Rigid3& a_from_b) {
@@ -63,14 +58,6 @@ std::string objection(const PartPair& maps, const Consistency& consistency, cons
   if (consistency.verified == 0) return "no two keyframes were verified to show the same place";
 
   const bool few = consistency.agreeing < options.min_pairs;
-  if (const int common = in_common(maps.map_a(), consistency);
-      few && (consistency.agreeing < options.few_pairs || common < options.few_inliers)) {
-    return fmt::format(
-        "only {} keyframes agree on how the maps lie, with {} points and lines in common ({} keyframes are "
-        "needed, or {} with {} in common)",
-        consistency.agreeing, common, options.min_pairs, options.few_pairs, options.few_inliers);
-  }
-
   const FreeDirection free = free_direction(maps.map_a(), maps.map_b(), a_from_b, consistency.pairs);
   if ((few ? free.slides() : free.corridor()) && free.reach_m < options.few_extent_m) {
     return fmt::format(
@@ -79,20 +66,18 @@ std::string objection(const PartPair& maps, const Consistency& consistency, cons
         free.corridor() ? "corridor" : "wall", free.reach_m, options.few_extent_m);
   }
 
-  if (!few && consistency.span_m < options.min_span_m && consistency.span_rad < options.min_span_rad) {
-    return fmt::format(
-        "the keyframes that agree lie within {:.2f} m and {:.2f} rad: one place that looks alike is not "
-        "enough",
-        consistency.span_m, consistency.span_rad);
-  }
-
   return {};
 }
 
-std::string objection(const CrossValidation& validation, const MapFusionOptions& options) {
-  if (validation.confirmed >= options.min_confirmed * validation.expected) return {};
-  return fmt::format("of {} keyframes that should see what the other map holds, only {} do",
-                     validation.expected, validation.confirmed);
+/// A place that looks alike in part is told by what does not stand there.
+std::string objection(const MergeEvidence& merge) {
+  if (merge.ambiguity.against_like + merge.validation.against_like >= 0.0) return {};
+  return fmt::format(
+      "a place that looks alike in part: of {} keyframes that should see what the other map holds, {} do, "
+      "and "
+      "{} of {} landmarks are found",
+      merge.validation.expected, merge.validation.confirmed, merge.ambiguity.overlap.matched,
+      merge.ambiguity.overlap.expected);
 }
 
 Consistency consistency_of(const PartPair& maps, const PairSets& sets) {
@@ -102,6 +87,7 @@ Consistency consistency_of(const PartPair& maps, const PairSets& sets) {
   result.agreeing = support(sets.sets.front());
   result.span_m = sets.sets.front().span_m;
   result.span_rad = turn_between(maps.map_b(), sets.places_of(0));
+  result.places = std::min(result.agreeing, places_of(maps.map_b(), sets.places_of(0), maps.options));
   for (const std::size_t i : sets.sets.front().members) result.pairs.push_back(sets.pairs[i]);
   return result;
 }
@@ -218,13 +204,13 @@ MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, s
 
   if (merge.refused.empty()) {
     merge.ambiguity = ambiguity_of(maps, sets, merge.alignment.a_from_b);
-    merge.refused = objection(merge.ambiguity, merge.consistency.agreeing, options);
+    merge.refused = objection(merge.ambiguity, merge.consistency.places, options);
   }
 
   if (merge.refused.empty()) {
     merge.validation = cross_validate(maps, merge.pairs, merge.alignment.a_from_b);
     merge.pairs.insert(merge.pairs.end(), merge.validation.pairs.begin(), merge.validation.pairs.end());
-    merge.refused = objection(merge.validation, options);
+    merge.refused = objection(merge);
   }
 
   merge.accepted = merge.refused.empty();

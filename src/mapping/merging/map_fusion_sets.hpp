@@ -51,8 +51,10 @@ std::vector<VerifiedPair> verify_neighbours(const PartPair& maps, const PairSets
 /// Tests the alignment against the maps, together with others that are supported by the remaining sets or by
 /// a step of repetition.
 Ambiguity ambiguity_of(const PartPair& maps, const PairSets& sets, const geometry::Rigid3& a_from_b);
-/// Reason against merging maps of which `agreeing` keyframes agree; empty: there is none.
-std::string objection(const Ambiguity& ambiguity, int agreeing, const MapFusionOptions& options);
+/// Natural logarithm of the odds that two maps share a place, if keyframes at `places` places agree.
+double log_odds(const Ambiguity& ambiguity, int places, const MapFusionOptions& options);
+/// Reason against merging them; empty: there is none.
+std::string objection(const Ambiguity& ambiguity, int places, const MapFusionOptions& options);
 
 /// Keyframes of b with a view of a: those that do not agree yet are verified.
 CrossValidation cross_validate(const PartPair& maps, const std::vector<VerifiedPair>& agreeing,

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "merging/landmark_cells.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
@@ -94,8 +95,8 @@ MapOverlay::MapOverlay(const MapPart& a, const MapPart& b) : a_(side(a)), b_(sid
   alike_ /= std::max(1.0, pairs);
 }
 
-/// True if the side has a landmark there that looks alike; adds the probability of that by chance to `sum`.
-bool MapOverlay::match(const Side& side, const Landmark& landmark, const Eigen::Vector3d& at,
+/// Counts a landmark of the side there that looks alike, and the probability of that by chance.
+void MapOverlay::match(const Side& side, const Landmark& landmark, const Eigen::Vector3d& at,
                        OverlayFit& sum) const {
   // Cells are twice the reach wide: eight of them hold all that is near.
   const Eigen::Vector3i low = cloud::cell_of((at - Eigen::Vector3d::Constant(kReach_m)) / kCell_m);
@@ -115,11 +116,10 @@ bool MapOverlay::match(const Side& side, const Landmark& landmark, const Eigen::
 
   sum.matched += found ? 1 : 0;
   sum.chance += 1.0 - std::pow(1.0 - alike_, near);
-  return found;
 }
 
 void MapOverlay::overlay(const Side& moved, const Side& fixed, const Rigid3& fixed_from_moved,
-                         OverlayFit& sum, std::vector<Eigen::Vector3d>* matched) const {
+                         OverlayFit& sum) const {
   constexpr double kLikeSide = 0.8;  // cosine between the directions from which a landmark was seen
   constexpr double kTimes = 1.8;     // nearer or farther: a corner does not look the same from everywhere
   const std::vector<PlacedView> views = views_of(fixed.part);
@@ -148,7 +148,7 @@ void MapOverlay::overlay(const Side& moved, const Side& fixed, const Rigid3& fix
 
     if (there) {
       ++sum.expected;
-      if (match(fixed, landmark, at, sum) && matched != nullptr) matched->push_back(at);
+      match(fixed, landmark, at, sum);
     } else if (through) {
       ++sum.contradicted;
     }
@@ -157,15 +157,22 @@ void MapOverlay::overlay(const Side& moved, const Side& fixed, const Rigid3& fix
 
 namespace {
 
-/// Surface samples of one map in the views of another.
-void overlay_surfaces(const MapPart& moved, const MapPart& fixed, const Rigid3& fixed_from_moved,
-                      MapOverlay::Surfaces& sum) {
+struct SurfaceCell {
+  double there = 0.0;
+  double through = 0.0;
+};
+
+/// Surface samples of one map in the views of another, in cells.
+std::map<std::uint64_t, SurfaceCell> overlay_surfaces(const MapPart& moved, const MapPart& fixed,
+                                                      const Rigid3& fixed_from_moved) {
   constexpr double kFacing = 0.25;  // cosine
+  constexpr double kSurfaceCell_m = 0.3;
   const std::vector<PlacedView> views = views_of(fixed);
   const std::vector<KeyframeId> ids = moved.map->keyframe_ids();
   std::size_t count = 0;
   for (const KeyframeId id : ids) count += moved.map->keyframe(id).surface.size();
 
+  std::map<std::uint64_t, SurfaceCell> cells;
   const std::size_t step = stride(count, kMostTried);
   std::size_t next = 0;  // of all samples, one keyframe's after the other's
   for (const KeyframeId id : ids) {
@@ -175,7 +182,6 @@ void overlay_surfaces(const MapPart& moved, const MapPart& fixed, const Rigid3& 
       const Eigen::Vector3d at = fixed_from_camera * samples[next].point.cast<double>();
       const Eigen::Vector3d normal = fixed_from_camera.rotation * samples[next].normal.cast<double>();
       bool there = false;
-
       bool through = false;
       for (const PlacedView& view : views) {
         const Eigen::Vector3d in_camera = view.camera_from_world * at;
@@ -186,21 +192,33 @@ void overlay_surfaces(const MapPart& moved, const MapPart& fixed, const Rigid3& 
         through = through || what == Seen::kThrough;
       }
 
-      sum.there += there ? 1 : 0;
-      sum.through += through && !there ? 1 : 0;
+      if (!there && !through) continue;
+      SurfaceCell& cell = cells[cloud::pack_cell(cloud::cell_of(at / kSurfaceCell_m))];
+      (there ? cell.there : cell.through) += 1.0;
     }
 
     next -= samples.size();
   }
+
+  return cells;
 }
 
 }  // namespace
 
-MapOverlay::Surfaces MapOverlay::surfaces(const Rigid3& a_from_b) const {
-  Surfaces sum;
-  overlay_surfaces(b_.part, a_.part, a_from_b, sum);
-  overlay_surfaces(a_.part, b_.part, a_from_b.inverse(), sum);
-  return sum;
+double MapOverlay::surface_log_odds(const Rigid3& a_from_b) const {
+  constexpr double kThrough = 0.02;      // share that is seen through, of one place
+  constexpr double kThroughOther = 0.2;  // and of another one
+  constexpr double kWhole = 3.0;         // samples from which on a cell counts whole
+  const double there = std::log((1.0 - kThrough) / (1.0 - kThroughOther));
+  const double through = std::log(kThrough / kThroughOther);
+  double sum = 0.0;
+  for (const auto& cells : {overlay_surfaces(b_.part, a_.part, a_from_b),
+                            overlay_surfaces(a_.part, b_.part, a_from_b.inverse())}) {
+    for (const auto& [key, cell] : cells) {
+      sum += (cell.there * there + cell.through * through) / std::max(cell.there + cell.through, kWhole);
+    }
+  }
+  return std::min(0.0, sum);
 }
 
 OverlayFit MapOverlay::fit(const Rigid3& a_from_b) const {

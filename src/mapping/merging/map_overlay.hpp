@@ -20,21 +20,11 @@ class MapOverlay {
   /// The fit of b aligned with a.
   [[nodiscard]] OverlayFit fit(const geometry::Rigid3& a_from_b) const;
 
-  /// Surface samples of each map that lie in view of the other map's cameras and face them: `there` where
-  /// these saw a surface too, `through` where they saw through it.
-  struct Surfaces {
-    int there = 0;
-    int through = 0;
-    /// True if more than this share of at least `least` samples was seen through.
-    [[nodiscard]] bool contradict(double share, int least) const {
-      return there + through >= least && through > share * (there + through);
-    }
-  };
-  [[nodiscard]] Surfaces surfaces(const geometry::Rigid3& a_from_b) const;
-
-  /// Number of spots at which landmarks match when b is aligned with a, as seen along `step` (in a's world):
-  /// spots behind one another in that direction count once.
-  [[nodiscard]] int matching_spots(const geometry::Rigid3& a_from_b, const Eigen::Vector3d& step) const;
+  /// Natural logarithm of the odds that surfaces tell of one place, against another one: at most 0, for walls
+  /// and floors are confirmed wherever a map is laid. Surface samples of each map that lie in view of the
+  /// other map's cameras and face them are where these saw a surface too, or were seen through; those of a
+  /// cell of 0.3 m count as one.
+  [[nodiscard]] double surface_log_odds(const geometry::Rigid3& a_from_b) const;
 
   /// Other alignments of b with a, a step of `least_m` or more away from `a_from_b`: those supported by
   /// most landmarks seen by the keyframes of `pairs`.
@@ -56,10 +46,9 @@ class MapOverlay {
   };
   static Side side(const MapPart& part);
   static Landmark landmark(const maps::Map& map, core::PointId id);
-  bool match(const Side& side, const Landmark& landmark, const Eigen::Vector3d& at, OverlayFit& sum) const;
-  /// `matched`: receives the positions (in the fixed map's world) at which landmarks match; may be null.
+  void match(const Side& side, const Landmark& landmark, const Eigen::Vector3d& at, OverlayFit& sum) const;
   void overlay(const Side& moved, const Side& fixed, const geometry::Rigid3& fixed_from_moved,
-               OverlayFit& sum, std::vector<Eigen::Vector3d>* matched = nullptr) const;
+               OverlayFit& sum) const;
   static void vote(const Side& moved, const Side& fixed, const geometry::Rigid3& fixed_from_moved,
                    const std::vector<VerifiedPair>& pairs, std::vector<Eigen::Vector3d>& steps);
 

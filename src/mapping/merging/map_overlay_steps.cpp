@@ -87,40 +87,6 @@ class Peaks {
 
 }  // namespace
 
-int MapOverlay::matching_spots(const Rigid3& a_from_b, const Eigen::Vector3d& step) const {
-  constexpr double kWide_m = 0.25;
-  constexpr std::size_t kFew = 3;  // chance finds
-  OverlayFit sum;
-  std::vector<Eigen::Vector3d> matched;
-  std::vector<Eigen::Vector3d> in_b;
-  overlay(b_, a_, a_from_b, sum, &matched);
-  overlay(a_, b_, a_from_b.inverse(), sum, &in_b);
-
-  for (const Eigen::Vector3d& at : in_b) matched.push_back(a_from_b * at);
-  const Eigen::Vector3d along = step.normalized();
-  for (Eigen::Vector3d& at : matched) at -= along.dot(at) * along;
-
-  // The fullest spot, then the fullest of the rest.
-  for (int spots = 0;; ++spots) {
-    std::size_t most = 0;
-    Eigen::Vector3d fullest = Eigen::Vector3d::Zero();
-    const auto near = [](const Eigen::Vector3d& centre) {
-      return [&centre](const Eigen::Vector3d& at) { return (at - centre).norm() < kWide_m; };
-    };
-
-    for (const Eigen::Vector3d& centre : matched) {
-      const auto count =
-          static_cast<std::size_t>(std::count_if(matched.begin(), matched.end(), near(centre)));
-      if (count <= most) continue;
-      most = count;
-      fullest = centre;
-    }
-
-    if (most < kFew) return spots;
-    matched.erase(std::remove_if(matched.begin(), matched.end(), near(fullest)), matched.end());
-  }
-}
-
 /// Steps, in the fixed map's world, between landmarks that look very much alike.
 void MapOverlay::vote(const Side& moved, const Side& fixed, const Rigid3& fixed_from_moved,
                       const std::vector<VerifiedPair>& pairs, std::vector<Eigen::Vector3d>& steps) {

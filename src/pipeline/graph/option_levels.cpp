@@ -31,7 +31,7 @@ const Keys kAdvanced{
          "match.aligned_sigma bundle.line_sigma bundle.depth_factor edges.min_overlap surface.min_depth "
          "loops.robust loops.bundle loops.max_alternative vocabulary.branching vocabulary.levels "
          "verify.min_overlap verify.max_contradiction verify.rounds")},
-    {"merge", keys_in("few_pairs few_inliers few_extent verifications lag")},
+    {"merge", keys_in("few_extent prior_shared prior_wrong verifications lag")},
     {"cloud", keys_in("free_space_every smooth_position base")},
     {"refine",
      keys_in("pairs.min_overlap pairs.per_map icp.samples icp.iterations icp.max_rms icp.max_shift "
@@ -52,8 +52,8 @@ const Keys kInternal{
          "motion_prior pnp_start landmark.by_keyframes bundle.depth_rows "
          "solver.depth_rows verify.depth_rows verify.align verify.joint match.min_line_ratio")},
     {"merge",
-     keys_in("min_span min_turn max_translation max_rotation drift max_alternative "
-             "max_seen_through min_confirmed robust vocabulary.branching vocabulary.levels vocabulary.split "
+     keys_in("min_span min_turn max_translation max_rotation drift "
+             "robust vocabulary.branching vocabulary.levels vocabulary.split "
              "places.min_score places.min_absolute places.votes places.consistent verify.min_inliers "
              "verify.min_overlap verify.max_contradiction verify.min_found verify.min_evidence "
              "verify.min_cells verify.depth_rows verify.align verify.joint")},

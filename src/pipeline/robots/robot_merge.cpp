@@ -83,7 +83,8 @@ Json overlay_section(const mapping::OverlayFit& fit) {
   return {{"expected", fit.expected},
           {"matched", fit.matched},
           {"chance", rounded(fit.chance)},
-          {"seen_through", fit.contradicted}};
+          {"seen_through", fit.contradicted},
+          {"log_odds", rounded(fit.log_odds)}};
 }
 
 /// Adds standard deviations, the whole covariance, and the relative pose of the maps.
@@ -120,6 +121,7 @@ Json section_of(const RobotMerge& merge) {
                 {"agreeing", e.consistency.agreeing},
                 {"alternative", e.ambiguity.alternative},
                 {"overlay", overlay_section(e.ambiguity.overlap)},
+                {"log_odds_like", rounded(e.ambiguity.against_like + e.validation.against_like)},
                 {"expected", e.validation.expected},
                 {"confirmed", e.validation.confirmed},
                 {"pairs", e.pairs.size()},

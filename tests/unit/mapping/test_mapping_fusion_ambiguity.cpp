@@ -2,10 +2,12 @@
 // Keyframes agree on how two maps lie: is there another answer that is as good?
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <opencv2/core.hpp>
+#include <vector>
 
 #include "../../../src/mapping/merging/free_direction.hpp"
-#include "../../../src/mapping/merging/map_overlay.hpp"
+#include "../../../src/mapping/merging/picture_overlay.hpp"
 #include "plumbline/mapping/merging/map_fusion.hpp"
 #include "poster_view.hpp"
 
@@ -59,7 +61,6 @@ MergeEvidence decide(const maps::Map& a, const maps::Map& b, const Rigid3& shift
     pair.evidence.points = 150;
     pairs.push_back(pair);
   }
-  options.min_confirmed = 0.0;  // this is about the maps as a whole
   const core::Executor executor(1);
   return decide_overlap({{&a, {{0, kTestCamera}}}, {&b, {{1, kTestCamera}}}}, 0, 1, pairs, options, executor);
 }
@@ -98,23 +99,34 @@ TEST(FusionAmbiguity, WhatStandsBeforeItOnlyOnceTellsThatAStepIsWrong) {
   EXPECT_EQ(merge.ambiguity.alternative_m, 0.0);
 }
 
-/// How many spots match when the wall is laid over itself, a repetition further.
-int spots_a_step_further(const cv::Mat& wall) {
-  const maps::Map a = walk(wall);
-  const maps::Map b = as_second(a);
-  const MapOverlay maps({&a, {{0, kTestCamera}}}, {&b, {{1, kTestCamera}}});
-  const Eigen::Vector3d step(1.2, 0.0, 0.0);
-  return maps.matching_spots(Rigid3(Eigen::Matrix3d::Identity(), step), step);
+std::vector<double> correlations(const maps::Map& a, const maps::Map& b, const Rigid3& a_from_b = {}) {
+  return picture_correlations({&a, {{0, kTestCamera}}}, {&b, {{1, kTestCamera}}}, a_from_b);
 }
 
-TEST(FusionAmbiguity, AStripMatchesAtOneSpotAndAWallAtMany) {
-  cv::Mat wall = repeating_wall();
-  EXPECT_GE(spots_a_step_further(wall), 3);
-  const int middle = wall.rows / 2;
-  wall.rowRange(0, middle - 25).setTo(128);
-  wall.rowRange(middle + 25, wall.rows).setTo(128);
-  EXPECT_EQ(spots_a_step_further(wall), 1);
-  EXPECT_EQ(spots_a_step_further(cv::Mat(wall.size(), wall.type(), cv::Scalar(128))), 0);
+TEST(FusionAmbiguity, PicturesTellTheSameWallFromAnother) {
+  const maps::Map a = walk(tests::poster(1800, 5));
+  const std::vector<double> same = correlations(a, as_second(a));
+  const PictureOdds odds;
+  ASSERT_GT(same.size(), 30U);
+  EXPECT_GT(*std::min_element(same.begin(), same.end()), 0.9);
+  EXPECT_GT(odds.of_one_place(same), 9.2);
+  EXPECT_GT(odds.against_like(same), 1.0);
+
+  const std::vector<double> other = correlations(a, as_second(walk(tests::poster(1800, 6))));
+  EXPECT_LT(odds.of_one_place(other), -9.2);
+  const std::vector<double> beside =
+      correlations(a, as_second(a), Rigid3(Eigen::Matrix3d::Identity(), {0.4, 0.0, 0.0}));
+  EXPECT_LT(odds.of_one_place(beside), -9.2) << "the same wall, 0.4 m beside";
+  EXPECT_TRUE(correlations(a, as_second(a), Rigid3(Eigen::Matrix3d::Identity(), {0.0, 0.0, 9.0})).empty());
+}
+
+TEST(FusionAmbiguity, AThirdOfOtherPicturesIsALikePlace) {
+  cv::Mat wall = tests::poster(1800, 5);
+  const maps::Map a = walk(wall);
+  tests::poster(1800, 6).rowRange(0, 800).copyTo(wall.rowRange(0, 800));
+  const std::vector<double> mixed = correlations(a, as_second(walk(wall)));
+  EXPECT_GT(PictureOdds().of_one_place(mixed), 0.0) << "most of it is the same";
+  EXPECT_LT(PictureOdds().against_like(mixed), -3.0);
 }
 
 TEST(FusionAmbiguity, MapsThatContradictAreNotMerged) {
@@ -140,11 +152,8 @@ TEST(FusionAmbiguity, FewKeyframesWillDoWhenMapsShowThatNothingRepeats) {
   other.few_extent_m = 1.0;  // the maps are of 0.5 m
   EXPECT_NE(decide(a, as_second(a), Rigid3{}, other).refused.find("are needed"), std::string::npos);
   other = few;
-  other.few_inliers = 1000000;
-  EXPECT_FALSE(decide(a, as_second(a), Rigid3{}, other).accepted);
-  other = few;
-  other.few_pairs = 49;
-  EXPECT_FALSE(decide(a, as_second(a), Rigid3{}, other).accepted);
+  other.prior_wrong = 1e-300;
+  EXPECT_NE(decide(a, as_second(a), Rigid3{}, other).refused.find("to 1 are needed"), std::string::npos);
 }
 
 TEST(FusionAmbiguity, MapsWithoutLandmarksTellNothing) {
@@ -156,13 +165,14 @@ TEST(FusionAmbiguity, MapsWithoutLandmarksTellNothing) {
     a.add_keyframe(keyframe, Rigid3(Eigen::Matrix3d::Identity(), {-kStep_m * i, 0.0, 0.0}));
   }
   const MergeEvidence merge = decide(a, as_second(a), Rigid3{});
-  EXPECT_TRUE(merge.accepted) << merge.refused;
+  EXPECT_FALSE(merge.accepted) << "keyframes of four places alone";
   EXPECT_EQ(merge.ambiguity.overlap.expected, 0);
   EXPECT_EQ(merge.ambiguity.overlap.seen_through(), 0.0);
-  MapFusionOptions few;
-  few.min_pairs = 50;
-  few.few_extent_m = 0.3;
-  EXPECT_NE(decide(a, as_second(a), Rigid3{}, few).refused.find("0 pieces of surface"), std::string::npos);
+  EXPECT_EQ(merge.ambiguity.overlap.log_odds, 0.0);
+  EXPECT_NE(merge.refused.find("to 1 are needed"), std::string::npos) << merge.refused;
+  MapFusionOptions generous;
+  generous.prior_wrong = 0.01;
+  EXPECT_TRUE(decide(a, as_second(a), Rigid3{}, generous).accepted);
 }
 
 /// Pieces of walls that face these directions, seen by cameras that go along x.

@@ -27,22 +27,15 @@
 namespace plumbline::mapping {
 
 struct MapFusionOptions {
-  int min_pairs = 5;  ///< keyframes of each map that must agree
-  /// Exception for short overlaps: `few_pairs` keyframes suffice if they share `few_inliers` points and lines
-  /// (lines count twice), if surfaces constrain all directions or both maps extend over `few_extent_m` in
-  /// a free one, and if nothing supports another alignment.
-  int few_pairs = 2;
-  int few_inliers = 100;
+  int min_pairs = 5;  ///< with fewer keyframes that agree, those around them are verified too
+  /// Smallest extent of both maps along a direction that the surfaces of the agreeing keyframes leave free:
+  /// repetition along it cannot be seen in less.
   double few_extent_m = 3.0;
-  double min_span_m = 0.25;   ///< smallest distance between agreeing keyframes; or
-  double min_span_rad = 0.5;  ///< smallest rotation between them
+  double min_span_m = 0.25;   ///< agreeing keyframes nearer than this, and
+  double min_span_rad = 0.5;  ///< turned by less than this, count as one
   ConsistencyOptions consistency;
-  /// Smallest ratio of the keyframes of another alignment to those of the best one that makes it ambiguous.
-  double alternative = 0.1;
-  /// The same ratio for matching landmarks.
-  double alternative_share = 0.06;
-  double max_seen_through = 0.06;  ///< share of landmarks seen through above which it is refuted
-  double min_confirmed = 0.5;    ///< share of the keyframes with a view of the other map that must confirm it
+  double prior_shared = 0.1;     ///< probability, before anything is seen, that two maps share a place
+  double prior_wrong = 1e-4;     ///< largest probability of a wrong merge
   int verifications = 250;       ///< largest number of keyframe pairs that are verified for each two maps
   bool robust = true;            ///< the pose graph may reject pairs
   bool merge_duplicates = true;  ///< merge duplicate landmarks; a preview does not
@@ -76,8 +69,9 @@ struct VerifiedPair {
 struct OverlayFit {
   int expected = 0;  ///< landmarks where the other map measured a surface, from a similar side and distance
   int matched = 0;   ///< expected landmarks that the other map has too
-  int contradicted = 0;  ///< landmarks where the other map saw through
-  double chance = 0.0;   ///< expected matches with any other landmarks of that density
+  int contradicted = 0;   ///< landmarks where the other map saw through
+  double chance = 0.0;    ///< expected matches with any other landmarks of that density
+  double log_odds = 0.0;  ///< natural logarithm of the odds that it is one place, against any other
   /// Share of the expected landmarks that match, beyond chance.
   [[nodiscard]] double share() const {
     return expected > 0 ? std::max(0.0, matched - chance) / expected : 0.0;
@@ -93,6 +87,7 @@ struct OverlayFit {
 struct Consistency {
   int verified = 0;                 ///< pairs in all
   int agreeing = 0;                 ///< keyframes of the set, on the side that has fewer
+  int places = 0;                   ///< the same, without those at one place
   double span_m = 0.0;              ///< largest distance between b's keyframes of the set
   double span_rad = 0.0;            ///< largest rotation between them
   std::vector<VerifiedPair> pairs;  ///< pairs of the set
@@ -109,20 +104,19 @@ struct Alignment {
 /// Evidence on whether another alignment would fit as well.
 struct Ambiguity {
   OverlayFit overlap;  ///< fit of the maps as aligned
-  /// Largest number of keyframes that support another alignment which the maps do not refute.
-  int alternative = 0;
-  OverlayFit alternative_overlap;  ///< fit of the best other alignment that is not refuted
+  /// Natural logarithm of the odds that it is one place, against one that looks alike in part: from cells of
+  /// the pictures that do not correlate, and from surfaces that are seen through.
+  double against_like = 0.0;
+  OverlayFit alternative_overlap;  ///< fit of the best other alignment that has the odds on its side
+  int alternative = 0;             ///< keyframes that support it
   double alternative_m = 0.0;      ///< distance by which that alignment moves b's cameras; 0: there is none
-  /// Pieces of surface of one map that the other one has, and that it saw through; counted where few
-  /// keyframes agree.
-  int surfaces_there = 0;
-  int surfaces_through = 0;
 };
 
 /// Check that other keyframes see what they should, if the alignment is right.
 struct CrossValidation {
   int expected = 0;                 ///< keyframes of b that should see what a saw
   int confirmed = 0;                ///< expected keyframes that do
+  double against_like = 0.0;        ///< as in Ambiguity, from these two numbers
   std::vector<VerifiedPair> pairs;  ///< further pairs that agree
 };
 
