@@ -17,7 +17,7 @@ mkdir -p "$work"
 lean=(-q --force --set output.views= --set output.pcd=off --set fuse.voxel=20mm)
 
 world() { # NAME SCENE SEED FRAMES EVENTS
-  [ -d "$work/$1" ] || "$program" synth "$2" -o "$work/$1" --frames "$4" --seed "$3" --events "$5" --reference-spacing 0.5 -q
+  [ -d "$work/$1" ] || "$program" synth "$2" -o "$work/$1" --frames "$4" --seed "$3" ${5:+--events "$5"} --reference-spacing 0.5 -q
 }
 judge() { # RECORDING
   "$program" map "$1" -o "$work/out" "${lean[@]}" 2>"$work/log" || true
