@@ -237,9 +237,16 @@ void World::prepare_textures() {
 
   for (const Job& job : jobs)
     texture_sizes.push_back(texture_size(*job.material, options.texture, job.aspect));
-  textures.prepare(jobs.size(), [jobs, texture = options.texture](std::size_t k) {
+  constexpr std::size_t kMostBytes = 96U << 20U;
+  const auto draw = [jobs, texture = options.texture](std::size_t k) {
     return draw_texture(*jobs[k].material, texture, jobs[k].seed, jobs[k].aspect);
-  });
+  };
+  const auto size = [](const Texture2d& t) {
+    std::size_t texels = 0;
+    for (const Texture2d::Level& level : t.levels) texels += level.texels.size();
+    return sizeof(std::uint32_t) * texels;
+  };
+  textures.prepare(jobs.size(), draw, size, kMostBytes);
 }
 
 core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const SynthOptions& options,
