@@ -155,7 +155,12 @@ void check_header(const std::string& key, const Bytes& bytes, std::vector<RobotI
     }
 
   } else if (key == "estimates") {
-    for (const auto& estimate : decode<CameraEstimates>(plain(kMostSmall))) check(estimate.second);
+    const auto estimates = decode<CameraEstimates>(plain(kMostSmall));
+    for (const auto& estimate : estimates.each) check(estimate.second);
+    for (const auto& [robot, s] : estimates.told) {
+      for (const double one : {s.fx, s.centre, s.distortion, s.readout_s, s.depth_slope, s.depth_delay_s})
+        demand(one >= 0.0 && one < 1e9, "a camera's standard deviation is out of range");
+    }
 
   } else if (key == "result") {
     check(decode<ResultFrame>(plain(kMostSmall)).output_from_map);

@@ -42,6 +42,11 @@ void fields(Io& io, Lens& lens) {
 }
 
 template <typename Io>
+void fields(Io& io, CameraSigma& s) {
+  io(s.fx, s.centre, s.distortion, s.readout_s, s.depth_slope, s.depth_delay_s);
+}
+
+template <typename Io>
 void fields(Io& io, Camera& c) {
   Lens lens = c.lens();
   io(c.name, c.color, lens, c.depth_scale, c.fps, c.color_from_depth, c.depth, c.depth_lens, c.readout_s,
@@ -79,7 +84,21 @@ void fields(Io& io, CameraEstimate& e) {
   io(e.asked_at, e.used_from, e.answers, e.views, e.better, e.gain, e.note, e.doubt, e.found, e.covariance,
      e.wrong);
 }
-using CameraEstimates = std::vector<std::pair<std::int32_t, CameraEstimate>>;  ///< with the robots' numbers
+/// With the robots' numbers.
+struct CameraEstimates {
+  std::vector<std::pair<std::int32_t, CameraEstimate>> each;
+  /// Standard deviations in the cameras' files. Older stores end before these, and so do those without any.
+  std::vector<std::pair<std::int32_t, sensor::CameraSigma>> told;
+};
+template <typename Io>
+void fields(Io& io, CameraEstimates& estimates) {
+  io(estimates.each);
+  if constexpr (Io::kReads) {
+    if (!io.at_end()) io(estimates.told);
+  } else if (!estimates.told.empty()) {
+    io(estimates.told);
+  }
+}
 
 template <typename Io>
 void fields(Io& io, RobotInfo& robot) {

@@ -83,7 +83,9 @@ void put_camera_versions(Database& database, std::int64_t transaction, const std
 CameraEstimates estimates_of(const std::vector<RobotInfo>& robots) {
   CameraEstimates estimates;
   for (const RobotInfo& robot : robots) {
-    if (robot.estimate) estimates.emplace_back(robot.number, *robot.estimate);
+    if (robot.estimate) estimates.each.emplace_back(robot.number, *robot.estimate);
+    if (encoded(robot.camera.sigma) != encoded(sensor::CameraSigma()))
+      estimates.told.emplace_back(robot.number, robot.camera.sigma);
   }
   return estimates;
 }
@@ -91,7 +93,8 @@ CameraEstimates estimates_of(const std::vector<RobotInfo>& robots) {
 void put_camera_estimates(Database& database, std::int64_t transaction,
                           const std::vector<RobotInfo>& robots) {
   const CameraEstimates estimates = estimates_of(robots);
-  if (!estimates.empty()) put_header(database, transaction, "estimates", pack(encoded(estimates)));
+  if (!estimates.each.empty() || !estimates.told.empty())
+    put_header(database, transaction, "estimates", pack(encoded(estimates)));
 }
 
 void put_complete(Database& database, std::int64_t transaction, bool complete) {
@@ -167,8 +170,15 @@ StoreHeader read_header(Database& database) {
   }
   Statement estimates(database, "SELECT data FROM header WHERE key = 'estimates'");
   if (estimates.step()) {
-    for (const auto& of : decode<CameraEstimates>(estimates.unpacked(0)))
-      each(of.first, [&of](RobotInfo& robot) { robot.estimate = of.second; });
+    const auto all = decode<CameraEstimates>(estimates.unpacked(0));
+    for (const auto& of : all.each) each(of.first, [&of](RobotInfo& robot) { robot.estimate = of.second; });
+    for (const auto& of : all.told) {
+      each(of.first, [&of](RobotInfo& robot) {
+        robot.camera.sigma = of.second;
+        for (CameraVersion& version : robot.versions) version.camera.sigma = of.second;
+        if (robot.estimate) robot.estimate->found.sigma = of.second;
+      });
+    }
   }
   return header;
 }

@@ -45,6 +45,7 @@ class PackedLiveImages {
   }
 
   void put(std::size_t index, const LiveImages& images) {
+    if (has(index)) return;
     core::Bytes bytes;
     for (const cv::Mat& image : {images.color, images.depth}) {
       const cv::Mat whole = image.isContinuous() ? image : image.clone();
@@ -52,6 +53,7 @@ class PackedLiveImages {
     }
 
     Place place{end_, core::pack(bytes)};
+    bytes_ += place.size;
     if (file_ >= 0 && write_all(place)) {
       end_ += static_cast<off_t>(place.size);
       place.bytes = {};
@@ -60,6 +62,8 @@ class PackedLiveImages {
   }
 
   [[nodiscard]] bool has(std::size_t index) const { return places_.count(index) != 0; }
+  [[nodiscard]] std::size_t frames() const { return places_.size(); }
+  [[nodiscard]] std::size_t bytes() const { return bytes_; }
 
   [[nodiscard]] std::optional<LiveImages> get(std::size_t index, const cv::Size& color,
                                               const cv::Size& depth) const {
@@ -111,6 +115,7 @@ class PackedLiveImages {
 
   int file_ = -1;
   off_t end_ = 0;
+  std::size_t bytes_ = 0;  ///< packed, in the file or in memory
   std::map<std::size_t, Place> places_;
 };
 
@@ -238,6 +243,15 @@ class LiveFrames::Store {
     return stamps_.size();
   }
 
+  [[nodiscard]] LiveReport report() const {
+    const std::lock_guard lock(mutex_);
+    LiveReport report;
+    report.taken = stamps_.size();
+    report.kept = kept_.frames();
+    report.kept_bytes = kept_.bytes();
+    return report;
+  }
+
   struct Stamps {
     double color = 0.0;
     double depth = 0.0;
@@ -349,11 +363,7 @@ class LiveFrames::View final : public FrameSource {
   void keep(std::size_t index) const override { store_->keep(index); }
   void release(std::size_t index) const override { store_->release(index); }
   [[nodiscard]] bool given_up() const override { return store_->abandoned(); }
-  [[nodiscard]] LiveReport report() const override {
-    LiveReport report;
-    report.taken = store_->size();
-    return report;
-  }
+  [[nodiscard]] LiveReport report() const override { return store_->report(); }
 
  private:
   std::string format_ = "live";

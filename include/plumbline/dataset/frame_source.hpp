@@ -47,11 +47,13 @@ struct StoredPair {
 
 /// Counts of a live source's images.
 struct LiveReport {
-  std::size_t taken = 0;      ///< frames
-  std::size_t dropped = 0;    ///< frames that arrived while too many waited
-  std::size_t backwards = 0;  ///< frames whose stamp was not later than the last one's
-  std::size_t unpaired = 0;   ///< images of either kind without one of the other near them
-  std::size_t lost = 0;       ///< messages that the network reported as lost
+  std::size_t taken = 0;       ///< frames
+  std::size_t dropped = 0;     ///< frames that arrived while too many waited
+  std::size_t backwards = 0;   ///< frames whose stamp was not later than the last one's
+  std::size_t unpaired = 0;    ///< images of either kind without one of the other near them
+  std::size_t lost = 0;        ///< messages that the network reported as lost
+  std::size_t kept = 0;        ///< frames whose images were kept, to be read once more
+  std::size_t kept_bytes = 0;  ///< of these, packed
 };
 
 /// Read access to one recording. All const methods are thread-safe: frames may be decoded side by side.

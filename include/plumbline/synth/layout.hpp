@@ -21,8 +21,8 @@ core::Result<Scene> open_scene(const std::string& name_or_file, const SynthOptio
 /// False if the floor has no room for them.
 bool add_people(int count, int seed, Scene& scene);
 
-/// Lets at most SynthOptions::moving_doors doors of a world made from a number swing, when no camera is near
-/// and as far as nothing is in the way of their leaves.
+/// Lets at most SynthOptions::moving_doors doors of a world made from a number swing, and moving_drawers
+/// drawers of any scene slide, when no camera is near and as far as nothing is in their way.
 void choose_moving_doors(const SynthOptions& options, Scene& scene);
 
 }  // namespace plumbline::synth

@@ -28,6 +28,7 @@ struct SynthOptions {
   std::string changes;         ///< a seed or a file of edits: the same world another day; "": as it is
   bool hall = false;           ///< one room of an office or building is 20 m long
   int moving_doors = 0;        ///< at most so many doors of a world made from a number swing meanwhile
+  int moving_drawers = 0;      ///< at most so many drawers of desks slide out and back meanwhile
   int walkers = 0;             ///< number of the scene's walkers to film; they are not in reference.ply
   Texture texture = Texture::kFull;  ///< kNone: white cloth and grey floors, geometry unchanged
   Sensor sensor = Sensor::kKinect;   ///< kIdeal: no noise, no offset between stamps, no blur

@@ -102,14 +102,17 @@ struct DoorLeaf {
   double open_rad = 0.0;
 };
 
-/// A leaf that swings to another angle and back at times.
+/// A leaf that swings to another angle and back at times; or a drawer of a desk that slides out and back.
 struct MovingDoor {
-  std::size_t leaf = 0;        ///< index into Scene::leaves
-  int opening = 0;             ///< index into Plan::openings
-  double rest_rad = 0.0;       ///< how far it is open else
-  double other_rad = 0.0;      ///< where it swings to
-  double swing = 1.5;          ///< s that it takes to swing there, and back
-  double hold = 3.0;           ///< s that it stays there
+  std::size_t leaf = 0;                             ///< index into Scene::leaves
+  int opening = 0;                                  ///< index into Plan::openings
+  std::string drawer;                               ///< its name; empty: a door
+  Eigen::Vector3d slide = Eigen::Vector3d::Zero();  ///< m, of a drawer, whose "angles" are shares of it
+  std::vector<Face> body;                           ///< of a drawer, behind its front; where it is pulled out
+  double rest_rad = 0.0;                            ///< how far it is open else
+  double other_rad = 0.0;                           ///< where it swings to
+  double swing = 1.5;                               ///< s that it takes to swing there, and back
+  double hold = 3.0;                                ///< s that it stays there
   std::vector<double> starts;  ///< s after the first frame, rising; of the first round if there are several
 
   /// Angle from shut, t seconds after the first frame.

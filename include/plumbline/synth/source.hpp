@@ -35,11 +35,12 @@ struct PathMotion {
   Eigen::Vector3d turn_rate;     ///< rad/s, in that frame
 };
 
-/// A door of a world made from a number that swings.
+/// A door of a world made from a number that swings, or a drawer that slides.
 struct DoorSwing {
-  int opening;      ///< index into Plan::openings
-  double from, to;  ///< stamps, s
-  double open_rad;  ///< how far it is open afterwards
+  int opening;         ///< index into Plan::openings
+  std::string drawer;  ///< its name; empty: a door
+  double from, to;     ///< stamps, s
+  double open;         ///< how far it is open afterwards, rad, or m
 };
 
 class SynthSource final : public dataset::FrameSource {

@@ -75,7 +75,8 @@ class LiveSource final : public FrameSource {
 
   [[nodiscard]] LiveReport report() const override {
     const LiveCounts counts = live_->stream->counts();
-    return {counts.taken, counts.dropped, counts.backwards, counts.unpaired, counts.lost};
+    return {counts.taken, counts.dropped, counts.backwards, counts.unpaired,
+            counts.lost,  counts.kept,    counts.kept_bytes};
   }
 
  private:

@@ -209,7 +209,11 @@ void LiveStream::keep(std::size_t index) {
   const auto frame = frames_.find(index);
   if (frame == frames_.end()) return;
   for (Image* image : {&frame->second.color, &frame->second.depth}) {
-    if (!image->spot && image->bytes) image->spot = kept_.add(*image->bytes);
+    if (image->spot || !image->bytes) continue;
+    image->spot = kept_.add(*image->bytes);
+    if (!image->spot) continue;
+    if (image == &frame->second.depth) ++counts_.kept;
+    counts_.kept_bytes += image->spot->size;
   }
 }
 

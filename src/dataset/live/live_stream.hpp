@@ -36,6 +36,8 @@ struct LiveCounts {
   std::size_t backwards = 0;  ///< because their stamp is not later than the last one's
   std::size_t unpaired = 0;   ///< images of either kind without one of the other near them
   std::size_t lost = 0;       ///< messages, by the network
+  std::size_t kept = 0;       ///< frames whose images were kept
+  std::size_t kept_bytes = 0;
 };
 
 class LiveStream final : public MessageImages {

@@ -95,6 +95,8 @@ std::string live_text(const Json& live) {
                                    {"lost_messages", "messages lost by the network"}}) {
     if (count(name) > 0) text += fmt::format(", {} {}", count(name), what);
   }
+  text += fmt::format("; images of {} were kept, {:.1f} MB packed", count("kept_frames"),
+                      static_cast<double>(count("kept_bytes")) / 1e6);
   return text;
 }
 

@@ -20,7 +20,9 @@ Json live_section(const dataset::LiveReport& live) {
           {"dropped", live.dropped},
           {"stamps_backwards", live.backwards},
           {"unpaired_images", live.unpaired},
-          {"lost_messages", live.lost}};
+          {"lost_messages", live.lost},
+          {"kept_frames", live.kept},
+          {"kept_bytes", live.kept_bytes}};
 }
 
 class ReadStage : public Stage {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Doors that no way depends on swing while cameras film, as far as nothing is in the way of their leaves.
+// Doors that no way depends on swing while cameras film, and drawers slide, as far as nothing is in their
+// way.
 #include <algorithm>
 #include <cmath>
 
@@ -101,15 +102,17 @@ std::vector<std::vector<Eigen::Vector3d>> cameras(const SynthOptions& options, c
   return out;
 }
 
-/// Times at which a door begins to swing, with no camera near until it is back; none after the last camera's
-/// end.
-void plan_swings(const std::vector<std::vector<Eigen::Vector3d>>& all, const DoorLeaf& leaf, double reach,
-                 MovingDoor& door, Rng& rng) {
+/// Chooses how long a door at a place on the floor takes, and the times at which it begins to swing, with no
+/// camera near until it is back; none after the last camera's end.
+void plan_swings(const std::vector<std::vector<Eigen::Vector3d>>& all, const Eigen::Vector3d& foot,
+                 double reach, MovingDoor& door, Rng& rng) {
+  door.swing = rng.uniform(1.0, 2.2);
+  door.hold = rng.uniform(1.0, 5.0);
   std::vector<char> near;
   for (const auto& places : all) {
     near.resize(std::max(near.size(), places.size()), 0);
     for (std::size_t i = 0; i < places.size(); ++i) {
-      const Eigen::Vector3d d = places[i] - leaf.hinge;
+      const Eigen::Vector3d d = places[i] - foot;
       if (d.z() > 0.0 && d.z() < 2.5 && d.head<2>().norm() < reach + kCameraRoom) near[i] = 1;
     }
   }
@@ -127,12 +130,91 @@ void plan_swings(const std::vector<std::vector<Eigen::Vector3d>>& all, const Doo
   }
 }
 
+/// The middle of faces [first, first + count).
+Eigen::Vector3d middle_of(const Scene& scene, std::size_t first, std::size_t count) {
+  Eigen::AlignedBox3d box;
+  for (std::size_t i = first; i < first + count; ++i) {
+    for (const Vector2d& uv : scene.faces[i].polygon) box.extend(scene.faces[i].at(uv.x(), uv.y()));
+  }
+  return box.center();
+}
+
+/// No face of another object is in a box, m, in a frame.
+bool is_free(const Scene& scene, int object, const geometry::Rigid3& frame, const Eigen::AlignedBox3d& box) {
+  const geometry::Rigid3 to_frame = frame.inverse();
+  return std::none_of(scene.faces.begin(), scene.faces.end(), [&](const Face& face) {
+    Eigen::AlignedBox3d bounds;
+    for (const Vector2d& uv : face.polygon) bounds.extend(to_frame * face.at(uv.x(), uv.y()));
+    return face.object != object && bounds.intersects(box);
+  });
+}
+
+/// Drawers of all desks that can be pulled out; add_desk() makes the six boxes of their fronts and handles
+/// last.
+std::vector<MovingDoor> drawers(const std::vector<std::vector<Eigen::Vector3d>>& places, Scene& scene,
+                                Rng& rng) {
+  constexpr std::size_t kBox = 6, kDesk = 10 * kBox;
+  std::vector<MovingDoor> able;
+  for (std::size_t i = 0; i + kDesk <= scene.faces.size(); ++i) {
+    const int object = scene.faces[i].object;
+    const std::string& type = scene.objects[static_cast<std::size_t>(object)].type;
+    if (type != "desk" || (i > 0 && scene.faces[i - 1].object == object)) continue;
+    const auto drawer = static_cast<std::size_t>(rng.integer(0, 2));
+    MovingDoor door;
+    const DoorLeaf front{i + 4 * kBox + 2 * drawer * kBox, 2 * kBox,
+                         middle_of(scene, i + (4 + 2 * drawer) * kBox, kBox), 0.0};
+    if (scene.faces[front.first + front.count - 1].object != object) continue;
+
+    // The frame of the front: x along it, y inwards, z up.
+    Eigen::Vector3d in = middle_of(scene, i + 3 * kBox, kBox) - front.hinge;
+    in.z() = 0.0;
+    in.normalize();
+    geometry::Rigid3 frame;
+    frame.rotation << in.cross(Eigen::Vector3d::UnitZ()), in, Eigen::Vector3d::UnitZ();
+    frame.translation = front.hinge;
+    const double out = rng.uniform(0.15, 0.3);
+    if (!is_free(scene, object, frame,
+                 {Eigen::Vector3d(-0.2, -out - 0.08, -0.1), Eigen::Vector3d(0.2, 0.0, 0.1)}))
+      continue;
+
+    door.drawer = "drawer of " + scene.objects[static_cast<std::size_t>(object)].name;
+    door.leaf = scene.leaves.size();
+    door.opening = -1;
+    door.other_rad = 1.0;
+    door.slide = -out * in;
+    frame.translation += door.slide;
+    Scene box;
+    Builder(box).box(frame, {-0.19, 0.01, -0.08}, {0.19, 0.34, 0.06}, {"cardboard"});
+    for (Face& face : box.faces) face.object = object;
+    door.body = box.faces;
+    plan_swings(places, front.hinge - Eigen::Vector3d(0.0, 0.0, 0.5), 0.4, door, rng);
+    if (door.starts.empty()) continue;
+    scene.leaves.push_back(front);
+    able.push_back(std::move(door));
+  }
+  return able;
+}
+
+/// Some of those that can move.
+void choose(std::vector<MovingDoor> able, int count, Scene& scene, Rng& rng) {
+  for (; !able.empty() && count > 0; --count) {
+    const int k = rng.integer(0, static_cast<int>(able.size()) - 1);
+    scene.moving_doors.push_back(std::move(able[static_cast<std::size_t>(k)]));
+    able.erase(able.begin() + k);
+  }
+}
+
 }  // namespace
 
 void choose_moving_doors(const SynthOptions& options, Scene& scene) {
-  if (options.moving_doors < 1 || !scene.plan) return;
+  if (options.moving_drawers < 1 && (options.moving_doors < 1 || !scene.plan)) return;
   Rng rng(static_cast<std::uint64_t>(options.seed), 0xd005);
   const auto places = cameras(options, scene);
+  if (options.moving_drawers > 0) {
+    Rng own(static_cast<std::uint64_t>(options.seed), 0xd4a3);
+    choose(drawers(places, scene, own), options.moving_drawers, scene, own);
+  }
+  if (options.moving_doors < 1 || !scene.plan) return;
 
   // Leaves are in the order of the openings that have one.
   std::vector<MovingDoor> able;
@@ -152,17 +234,11 @@ void choose_moving_doors(const SynthOptions& options, Scene& scene) {
     if (std::max(door.rest_rad, door.other_rad) > most + kAngleStep ||
         std::abs(door.other_rad - door.rest_rad) < 0.4)
       continue;
-    door.swing = rng.uniform(1.0, 2.2);
-    door.hold = rng.uniform(1.0, 5.0);
-    plan_swings(places, leaf, reach_of(scene, leaf).norm(), door, rng);
+    plan_swings(places, leaf.hinge, reach_of(scene, leaf).norm(), door, rng);
     if (!door.starts.empty()) able.push_back(std::move(door));
   }
 
-  while (!able.empty() && scene.moving_doors.size() < static_cast<std::size_t>(options.moving_doors)) {
-    const int k = rng.integer(0, static_cast<int>(able.size()) - 1);
-    scene.moving_doors.push_back(std::move(able[static_cast<std::size_t>(k)]));
-    able.erase(able.begin() + k);
-  }
+  choose(std::move(able), options.moving_doors, scene, rng);
 }
 
 }  // namespace plumbline::synth

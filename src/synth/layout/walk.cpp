@@ -63,13 +63,20 @@ void visit(const Plan& plan, int room, Rng& rng, std::vector<char>& seen, std::v
   }
 }
 
-/// Rounds a closed line's corners and thins it out to steps of kStep, with clearance kept.
-std::vector<Vector2d> round_off(const std::vector<Vector2d>& corners, const Ground& ground) {
+/// Rounds a closed line's corners and thins it out to steps of kStep, with clearance kept. Corners in the
+/// rooms `keep` stay where they are.
+std::vector<Vector2d> round_off(const std::vector<Vector2d>& corners, const Ground& ground,
+                                const std::vector<const PlanRoom*>& keep) {
   std::vector<Vector2d> fine;
+  std::vector<char> fixed;
   for (std::size_t i = 0; i + 1 < corners.size(); ++i) {
     const Vector2d d = corners[i + 1] - corners[i];
     const int n = static_cast<int>(std::ceil(d.norm() / 0.1));
     for (int k = 0; k < n; ++k) fine.push_back(corners[i] + static_cast<double>(k) / n * d);
+    fixed.resize(fine.size(), 0);
+    if (n > 0)
+      fixed[fine.size() - static_cast<std::size_t>(n)] = std::any_of(
+          keep.begin(), keep.end(), [&](const PlanRoom* room) { return room->contains(corners[i]); });
   }
 
   for (int round = 0; round < 12; ++round) {
@@ -77,15 +84,29 @@ std::vector<Vector2d> round_off(const std::vector<Vector2d>& corners, const Grou
       const Vector2d &before = fine[(i + fine.size() - 1) % fine.size()],
                      &after = fine[(i + 1) % fine.size()];
       const Vector2d p = 0.25 * before + 0.5 * fine[i] + 0.25 * after;
-      if (ground.clearance(p) >= std::min(0.35, ground.clearance(fine[i]))) fine[i] = p;
+      if (fixed[i] == 0 && ground.clearance(p) >= std::min(0.35, ground.clearance(fine[i]))) fine[i] = p;
     }
   }
 
   // Where it is narrow steps are shorter, so that the curve through them keeps to the line.
   std::vector<Vector2d> out = {fine.front()};
-  for (const Vector2d& p : fine) {
+  for (std::size_t i = 0; i < fine.size(); ++i) {
+    const Vector2d& p = fine[i];
     const double step = ground.clearance(out.back(), p) < 0.35 ? 0.5 * kStep : kStep;
-    if ((p - out.back()).norm() >= step && (p - fine.front()).norm() >= 0.5 * step) out.push_back(p);
+    const bool far = (p - out.back()).norm() >= step && (p - fine.front()).norm() >= 0.5 * step;
+    if (far || (fixed[i] != 0 && p != out.back())) out.push_back(p);
+  }
+  return out;
+}
+
+/// The rooms of a plan that a way enters but its rounded line, if there is one, does not.
+std::vector<const PlanRoom*> missed(const Plan& plan, const std::vector<Vector2d>& way,
+                                    const std::vector<Vector2d>& line) {
+  std::vector<const PlanRoom*> out;
+  for (const PlanRoom& room : plan.rooms) {
+    const auto inside = [&](const Vector2d& p) { return room.contains(p); };
+    if (std::any_of(way.begin(), way.end(), inside) && std::none_of(line.begin(), line.end(), inside))
+      out.push_back(&room);
   }
   return out;
 }
@@ -276,7 +297,8 @@ RobotPath try_path(const Plan& plan, const Ground& ground, Route route, int robo
 
   const std::vector<Vector2d> back = ground.straight_way(way.back(), way.front());
   way.insert(way.end(), back.begin(), back.end());
-  const std::vector<Vector2d> line = round_off(way, ground);
+  std::vector<Vector2d> line = round_off(way, ground, {});
+  if (const auto rooms = missed(plan, way, line); !rooms.empty()) line = round_off(way, ground, rooms);
   if (line.size() < 4) return path;
 
   path.closed = true;

@@ -43,9 +43,10 @@ std::vector<DoorSwing> SynthSource::swings() const {
       for (const double start : door.starts) {
         for (const bool back : {false, true}) {
           const double at = round * once + start + (back ? door.swing + door.hold : 0.0);
+          const double unit = door.drawer.empty() ? 1.0 : door.slide.norm();
           if (start < once && at < end)
-            out.push_back({door.opening, kFirstStamp + at, kFirstStamp + at + door.swing,
-                           back ? door.rest_rad : door.other_rad});
+            out.push_back({door.opening, door.drawer, kFirstStamp + at, kFirstStamp + at + door.swing,
+                           unit * (back ? door.rest_rad : door.other_rad)});
         }
       }
     }

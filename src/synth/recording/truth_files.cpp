@@ -38,8 +38,11 @@ std::string describe_events(const SynthSource& source) {
     text += fmt::format("{},{:.6f},{:.6f},{}\n", to_string(e.kind), source.start() + e.start_s,
                         source.start() + e.start_s + e.duration_s, e.value);
   }
-  for (const DoorSwing& s : source.swings())
-    text += fmt::format("door {},{:.6f},{:.6f},{:.3f}\n", s.opening, s.from, s.to, s.open_rad * 180.0 / M_PI);
+  for (const DoorSwing& s : source.swings()) {
+    const bool door = s.drawer.empty();
+    text += fmt::format("{},{:.6f},{:.6f},{:.3f}\n", door ? fmt::format("door {}", s.opening) : s.drawer,
+                        s.from, s.to, door ? s.open * 180.0 / M_PI : s.open);
+  }
   return text;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 
 #include "render/ray_batch.hpp"
 
@@ -125,11 +126,11 @@ PLUMBLINE_INLINE std::uint8_t respond(float v) {
   return static_cast<std::uint8_t>(v + 0.5F);
 }
 
-/// Shades pixels of one picture.
+/// Shades pixels of one picture, in one thread. The textures that it has used stay until it ends.
 class Shader {
  public:
   Shader(const World& world, const View& view, const Exposure& exposure)
-      : world_(world), view_(view), exposure_(exposure) {
+      : world_(world), view_(view), exposure_(exposure), textures_(world.texture_sizes.size()) {
     scales_.reserve(view.faces.size());
     for (std::size_t i = 0; i < view.faces.size(); ++i) {
       const TexelScale s = texel_scale(world, i);
@@ -211,7 +212,10 @@ class Shader {
 
  private:
   [[nodiscard]] const Texture2d& texture(std::size_t id) const {
-    return world_.textures[static_cast<std::size_t>(world_.texture_of[id])];
+    const auto index = static_cast<std::size_t>(world_.texture_of[id]);
+    auto& texture = textures_[index];
+    if (!texture) texture = world_.textures[index];
+    return *texture;
   }
   PLUMBLINE_INLINE void chunk(int face, int from, int to, float y, std::uint8_t* bgr) const {
     if (face < 0) {
@@ -232,6 +236,7 @@ class Shader {
   const World& world_;
   const View& view_;
   Exposure exposure_;
+  mutable std::vector<std::shared_ptr<const Texture2d>> textures_;
   std::vector<std::array<float, 2>> scales_;
   float center_x_ = 0.0F, center_y_ = 0.0F, per_radius2_ = 0.0F;
 };
@@ -296,7 +301,8 @@ cv::Mat3b shade(const World& world, const View& view, const Exposure& exposure) 
 
 cv::Vec3b surface_color(const World& world, std::size_t face, double u, double v) {
   const TexelScale scale = texel_scale(world, face);
-  const Texture2d::Level& top = world.textures[static_cast<std::size_t>(world.texture_of[face])].levels[0];
+  const auto texture = world.textures[static_cast<std::size_t>(world.texture_of[face])];
+  const Texture2d::Level& top = texture->levels[0];
   const Vec4 texel =
       bilinear(top, static_cast<float>((u + static_cast<double>(world.offset_u[face])) * scale.u),
                static_cast<float>(-(v + static_cast<double>(world.offset_v[face])) * scale.v));

@@ -36,12 +36,15 @@ World::World(Scene s, SynthOptions o) : scene(std::move(s)), options(std::move(o
   // Leaves that swing take the place of those that stand still.
   gone.assign(fixed_faces, 0);
   for (std::size_t i = 0; i < scene.moving_doors.size(); ++i) {
-    const DoorLeaf& leaf = scene.leaves[scene.moving_doors[i].leaf];
-    movers.push_back({i, -1, scene.faces.size(), leaf.count});
+    const MovingDoor& door = scene.moving_doors[i];
+    const DoorLeaf& leaf = scene.leaves[door.leaf];
+    movers.push_back({i, -1, scene.faces.size(), leaf.count + door.body.size()});
     for (std::size_t k = leaf.first; k < leaf.first + leaf.count; ++k) {
       gone[k] = 1;
       scene.faces.push_back(Face(scene.faces[k]));
+      scene.faces.back().origin += door.slide;
     }
+    scene.faces.insert(scene.faces.end(), door.body.begin(), door.body.end());
   }
 
   for (const Face& face : scene.faces) materials.push_back(find_material(face.material));
@@ -116,6 +119,10 @@ geometry::Rigid3 World::motion(const Mover& mover, double t) const {
   const MovingDoor& door = scene.moving_doors[mover.which];
   const DoorLeaf& leaf = scene.leaves[door.leaf];
   geometry::Rigid3 swung;
+  if (!door.drawer.empty()) {  // its faces are where it is pulled out, for the light there
+    swung.translation = (door.angle(t) - 1.0) * door.slide;
+    return swung;
+  }
   swung.rotation = Eigen::AngleAxisd(leaf.open_rad - door.angle(t), Vector3d::UnitZ()).toRotationMatrix();
   swung.translation = leaf.hinge - swung.rotation * leaf.hinge;
   return swung;
@@ -230,9 +237,16 @@ void World::prepare_textures() {
 
   for (const Job& job : jobs)
     texture_sizes.push_back(texture_size(*job.material, options.texture, job.aspect));
-  textures.prepare(jobs.size(), [jobs, texture = options.texture](std::size_t k) {
+  constexpr std::size_t kMostBytes = 96U << 20U;
+  const auto draw = [jobs, texture = options.texture](std::size_t k) {
     return draw_texture(*jobs[k].material, texture, jobs[k].seed, jobs[k].aspect);
-  });
+  };
+  const auto size = [](const Texture2d& t) {
+    std::size_t texels = 0;
+    for (const Texture2d::Level& level : t.levels) texels += level.texels.size();
+    return sizeof(std::uint32_t) * texels;
+  };
+  textures.prepare(jobs.size(), draw, size, kMostBytes);
 }
 
 core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const SynthOptions& options,

@@ -71,7 +71,7 @@ class World {
   std::vector<Event> events;               ///< of scene and options
   std::vector<const Material*> materials;  ///< per face
   OnDemand<LightMap> light;                ///< per face
-  OnDemand<Texture2d> textures;
+  Recent<Texture2d> textures;
   std::vector<cv::Size> texture_sizes;  ///< px, of level 0
   std::vector<int> texture_of;          ///< per face
   std::vector<double> tile_m;           ///< per face: metres one copy of a tiled texture covers

@@ -49,6 +49,8 @@ void SynthOptions::declare(core::OptionTable& table) {
       "moving_doors", moving_doors, {0, 40}, "",
       "At most so many doors of a world made from a number swing while it is filmed; events.csv tells "
       "when");
+  table.integer("moving_drawers", moving_drawers, {0, 40}, "",
+                "At most so many drawers of desks slide out and back while it is filmed");
   table.integer("walkers", walkers, {0, 20}, "",
                 "Number of people who walk about: filmed, but no part of reference.ply");
 

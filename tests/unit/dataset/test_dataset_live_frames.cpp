@@ -99,7 +99,12 @@ TEST(LiveFrames, KeptOnesCanBeReadAgainOthersNot) {
     EXPECT_EQ(frames.waiting(), 4U);
     const auto recording = frames.recording();
     for (const std::size_t kept : {1U, 3U}) recording->keep(kept);
+    recording->keep(3);
     for (std::size_t done = 1; done < 4; ++done) recording->release(done);
+    const LiveReport report = recording->report();
+    EXPECT_EQ(report.kept, 2U);
+    EXPECT_GT(report.kept_bytes, 40U);
+    EXPECT_LT(report.kept_bytes, 2U * 5U * small_camera().color.width * small_camera().color.height);
 
     EXPECT_FALSE(frames.recording()->read(2));
     for (const std::size_t kept : {1U, 3U}) {

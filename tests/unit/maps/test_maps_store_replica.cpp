@@ -186,6 +186,8 @@ TEST(StoreReplica, HasWhatIsKnownOfTheCamerasAsItsStore) {
   known.covariance = Eigen::Matrix<double, 9, 9>::Identity() * 0.25;
   known.covariance(0, 8) = known.covariance(8, 0) = -0.125;
   known.wrong[5] = 0.75;
+  robots.front().camera.sigma.fx = 1.5;  // as its file tells
+  robots.front().camera.sigma.readout_s = 2e-4;
   step.robots = std::make_shared<std::vector<RobotInfo>>(robots);
   ASSERT_TRUE(writer->add(step));
   auto copy = StoreReplica::open(folder.path / "copy.db");
@@ -204,6 +206,10 @@ TEST(StoreReplica, HasWhatIsKnownOfTheCamerasAsItsStore) {
     EXPECT_EQ(robot.estimate->found.color.fx, 517.25);
     EXPECT_EQ(robot.estimate->covariance, known.covariance);
     EXPECT_EQ(robot.estimate->wrong, known.wrong);
+    for (const sensor::Camera& camera : {robot.camera, robot.estimate->found}) {
+      EXPECT_EQ(camera.sigma.fx, 1.5);
+      EXPECT_EQ(camera.sigma.readout_s, 2e-4);
+    }
   }
   EXPECT_EQ(dump(folder.path / "copy.db"), dump(folder.file()));
 

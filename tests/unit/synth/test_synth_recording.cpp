@@ -231,5 +231,33 @@ TEST_F(SynthRecording, DoorsSwingWhileNoCameraIsNear) {
   EXPECT_GT(doors, 1U);
 }
 
+TEST_F(SynthRecording, DrawersSlideOutOfDesks) {
+  options_.layout = 2;
+  options_.robots = 1;
+  options_.frames = 400;
+  options_.fps = 10.0;
+  options_.moving_drawers = 3;
+  Scene scene = *make_layout("office", options_);
+  const std::size_t faces = scene.faces.size();
+  choose_moving_doors(options_, scene);
+  ASSERT_FALSE(scene.moving_doors.empty());
+  EXPECT_EQ(scene.faces.size(), faces);
+
+  const core::Executor executor(1);
+  const auto source =
+      SynthSource::create(*build_world(*make_layout("office", options_), options_, executor), 0);
+  ASSERT_TRUE(source) << source.error().message;
+  const auto slides = (*source)->swings();
+  ASSERT_GE(slides.size(), 2U);
+  EXPECT_EQ(slides[0].drawer.rfind("drawer of desk", 0), 0U) << slides[0].drawer;
+  EXPECT_GT(slides[0].open, 0.14);
+  EXPECT_EQ(slides[1].open, 0.0);
+  for (const MovingDoor& drawer : scene.moving_doors) {
+    EXPECT_EQ(drawer.angle(drawer.starts.front()), 0.0);
+    EXPECT_NEAR(drawer.angle(drawer.starts.front() + drawer.swing + 0.5 * drawer.hold), 1.0, 1e-12);
+    EXPECT_EQ(drawer.slide.z(), 0.0);
+  }
+}
+
 }  // namespace
 }  // namespace plumbline::synth

@@ -4,6 +4,7 @@
 
 #include <fstream>
 #include <map>
+#include <opencv2/core.hpp>
 #include <sstream>
 
 #include "plumbline/dataset/image_io.hpp"

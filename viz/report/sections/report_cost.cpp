@@ -147,6 +147,9 @@ std::string cost_html(const ReportData& data) {
 
   if (number_at(s, "/timing/pace_hz") > 0.0)
     add("Played at", "{/timing/pace_hz:1} a second; {/timing/behind_s:2 s} behind at most");
+  if (number_at(s, "/live/kept_frames") > 0.0)
+    add("Pictures kept",
+        "{/live/kept_frames}, packed {/live/kept_bytes} bytes, to be read with another camera");
   add("Threads", "{/timing/threads}");
   add("Memory at most", "{/memory/peak_rss_mb:0 MB}");
   if (number_at(s, "/frames/resumed") > 0.0) {
