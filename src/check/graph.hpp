@@ -8,7 +8,7 @@
 
 namespace plumbline::check {
 
-/// What the alignment of two anchors says: `second` and `first` are numbers of anchors.
+/// The correction of a pair; `first` and `second` are numbers of anchors.
 struct PairLink {
   std::size_t first = 0;
   std::size_t second = 0;

@@ -103,6 +103,11 @@ PairRows FirstView::depth_rows(const View& second) const {
     if (std::abs(off) < 0.05 + 0.04 * p.z()) rows.depth.push_back({p, *normal, off});
   }
 
+  constexpr std::size_t kFewest = 40;
+  constexpr double kLeastShare = 0.15;
+  rows.meet = rows.depth.size() >= kFewest &&
+              static_cast<double>(rows.depth.size()) > kLeastShare * static_cast<double>(samples_.size());
+
   // Evenly spread ones are enough.
   if (rows.depth.size() > kMostRows) {
     const std::size_t all = rows.depth.size();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What two frames say about the motion between them.
+// The motion between two frames by their surfaces and corners.
 #include <Eigen/Core>
 #include <array>
 #include <opencv2/core/mat.hpp>
@@ -38,14 +38,13 @@ struct PairRows {
   std::vector<FlowRow> flow;
   std::size_t common = 0;   ///< surface points that fall on a surface of the second picture
   std::size_t through = 0;  ///< those that the second frame looks through
-  [[nodiscard]] bool meets() const { return depth.size() >= kFewest; }
+  bool meet = false;        ///< so much surface is common that it holds all directions
   /// True if the frames should show the same surface, and do not. Between visits something else may have
   /// come before it, but nobody looks through it.
   [[nodiscard]] bool contradicts(bool revisit) const {
     return common >= kMany && (revisit ? 2 * through > common : 4 * depth.size() < common);
   }
 
-  static constexpr std::size_t kFewest = 40;
   static constexpr std::size_t kMany = 600;
 };
 

@@ -15,8 +15,8 @@ namespace {
 using geometry::Rigid3;
 
 constexpr std::array<double, kRevisit> kGaps_s{1.0 / 3.0, 1.0, 3.0};
-/// Every n-th anchor begins a pair of one or three seconds: they still overlap.
-constexpr std::array<std::size_t, kRevisit> kEvery{1, 2, 4};
+/// Every n-th anchor begins a pair.
+constexpr std::array<std::size_t, kRevisit> kEvery{1, 1, 3};
 constexpr double kRevisitAfter_s = 5.0;
 constexpr double kLeastOverlap = 0.12;
 constexpr std::size_t kMostAnAnchor = 3;

@@ -22,7 +22,7 @@ struct Partners {
   std::array<std::vector<std::size_t>, kGaps> by_gap;  ///< numbers of anchors
 };
 
-/// What is needed of an anchor to look for revisits.
+/// A sample of an anchor's surface, to look for revisits.
 struct Outline {
   std::vector<Eigen::Vector3d> points, normals;  ///< in the world, a sample
   double share = 0.0;                            ///< of the picture that has surface

@@ -19,10 +19,10 @@ constexpr int kLevels = 2;
 constexpr float kNowhere = -1e4F;
 constexpr auto kMetres = static_cast<float>(1.0 / kDepthUnits_per_m);
 
-/// Where the first frame's grid of depth lies in a picture (CV_32FC2; kNowhere: nowhere), and in front of it.
+/// The first frame's grid of depth in another picture.
 struct Warp {
-  cv::Mat pixels;
-  cv::Mat depth;  ///< CV_32FC1
+  cv::Mat pixels;  ///< CV_32FC2; kNowhere: behind the camera, or without depth
+  cv::Mat depth;   ///< CV_32FC1, metres along z of that camera
 };
 
 Warp warp_into(const View& first, const View& second) {

@@ -49,7 +49,8 @@ SmallFrame RecalibratedFrame::operator()(const SmallFrame& frame) const {
 
   changed.gray = cv::Mat();
   cv::remap(frame.gray, changed.gray, gray_from_, cv::Mat(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
-  changed.depth = cv::Mat::zeros(frame.depth.size(), CV_16UC1);
+  changed.depth =
+      cv::Mat(frame.depth.size(), CV_16UC1, cv::Scalar(0));  // zeros() would write into the shared pixels
   for (int y = 0; y < frame.depth.rows; ++y) {
     for (int x = 0; x < frame.depth.cols; ++x) {
       const auto& from = depth_from_.at<cv::Vec2s>(y, x);

@@ -169,7 +169,7 @@ class Check {
     PairRows rows = first.depth_rows(second);
     pair.contradicts = rows.contradicts(gap == kRevisit);
     if (pair.contradicts) return pair;
-    if (!rows.meets()) return std::nullopt;
+    if (!rows.meet) return std::nullopt;
 
     first.add_flow(second, rows);
     const sensor::Pinhole& camera = second.camera->pinhole();

@@ -10,19 +10,51 @@ namespace plumbline::check {
 namespace {
 
 /// Coefficients of the expected error, found on the recordings that docs/method/trust.md names.
-constexpr double kGraph = 1.5;
-constexpr double kRevisits = 0.7;
-constexpr double kSplit = 0.6;
-constexpr double kLocal = 0.5;
+constexpr double kGraph = 0.5;
+constexpr double kRevisits = 0.4;
+constexpr double kSplit = 0.1;
+constexpr double kLocal = 0.7;
+constexpr double kThirds = 1.2;
+constexpr double kSeconds = 0.6;
 constexpr double kP95 = 1.9;
 
-constexpr double kMostRefused = 0.3;
-constexpr double kMostAlign_m = 0.015;
-constexpr double kMostAlign = 0.01;  ///< of the distance
+/// Limits beyond which a path is not trusted; a share is of the distance.
+struct Limit {
+  double metres;
+  double share;
+  [[nodiscard]] double at(double distance_m) const { return std::max(metres, share * distance_m); }
+};
+constexpr Limit kMostThirds{0.010, 0.007};
+constexpr Limit kMostSeconds{0.015, 0.010};
+constexpr Limit kMostLocal{0.020, 0.010};
+constexpr Limit kMostExpected{0.022, 0.012};
+constexpr double kMostRefused = 0.3;  ///< and one pair
 constexpr double kMostChi = 15.0;
-constexpr double kMostExpected = 0.015;  ///< of the distance
+constexpr std::size_t kEnoughPairs = 4;
 
 double squared(double value) { return value * value; }
+
+double worst_tear(const CheckReport& report) {
+  double worst = 0.0;
+  for (const BadPlace& tear : report.tears) worst = std::max(worst, tear.off_m);
+  return worst;
+}
+
+double expected_m(const CheckReport& r) {
+  return std::sqrt(
+      squared(r.told_m) + squared(kGraph * r.graph_m) + squared(kRevisits * r.align[kRevisit].median_m) +
+      squared(kSplit * r.split_m) + squared(kLocal * std::max(r.local.off_m, worst_tear(r))) +
+      squared(kThirds * r.align[kThird].median_m) + squared(kSeconds * r.align[kSecond].median_m));
+}
+
+/// "frames a second apart are 2.1 cm off each other", if that is beyond the limit.
+void doubt_gap(const CheckReport& report, Gap gap, const Limit& limit, const char* apart,
+               std::vector<std::string>& reasons) {
+  const GapReport& align = report.align[gap];
+  if (align.pairs < kEnoughPairs || align.median_m <= limit.at(report.distance_m)) return;
+  reasons.push_back(
+      fmt::format("frames {} apart are {:.1f} cm off each other", apart, 100.0 * align.median_m));
+}
 
 }  // namespace
 
@@ -31,39 +63,41 @@ double least_local(const CheckReport& report) {
 }
 
 void judge(CheckReport& report) {
-  report.expected_m = std::sqrt(squared(report.told_m) + squared(kGraph * report.graph_m) +
-                                squared(kRevisits * report.align[kRevisit].median_m) +
-                                squared(kSplit * report.split_m) + squared(kLocal * report.local.off_m));
+  report.expected_m = expected_m(report);
   report.p95_m = kP95 * report.expected_m;
 
   report.unchecked.emplace_back("scale");
-  if (!report.checked())
-    return report.unchecked.emplace_back("shape: no two frames show the same surface"), void();
+  if (!report.checked()) {
+    report.unchecked.emplace_back("shape: no two frames show the same surface");
+    return;
+  }
   if (report.align[kRevisit].pairs == 0) report.unchecked.emplace_back("drift: nothing was seen twice");
 
   std::vector<std::string>& reasons = report.reasons;
-  if (!report.tears.empty()) {
-    const BadPlace& worst = *std::max_element(report.tears.begin(), report.tears.end(),
-                                              [](const auto& a, const auto& b) { return a.off_m < b.off_m; });
-    reasons.push_back(
-        fmt::format("the path jumps by {:.1f} cm at {:.3f} s", 100.0 * worst.off_m, worst.stamp));
+  for (const BadPlace& tear : report.tears) {
+    if (tear.off_m < worst_tear(report)) continue;
+    reasons.push_back(fmt::format("the path jumps by {:.1f} cm at {:.3f} s", 100.0 * tear.off_m, tear.stamp));
+    break;
   }
-  if (report.refused > kMostRefused)
+  if (report.refused > kMostRefused + 1.0 / static_cast<double>(report.pairs)) {
     reasons.push_back(
         fmt::format("{:.0f} % of the pairs of frames do not fit the path", 100.0 * report.refused));
-  if (report.local.off_m > std::max(kMostAlign_m, kMostAlign * report.distance_m))
+  }
+  if (report.local.off_m > kMostLocal.at(report.distance_m)) {
     reasons.push_back(
         fmt::format("around {:.2f} s the path is off by about {:.1f} cm: frames a second apart do not fit",
                     report.local.stamp, 100.0 * report.local.off_m));
-  if (report.align[kSecond].median_m > std::max(kMostAlign_m, kMostAlign * report.distance_m))
-    reasons.push_back(fmt::format("frames a second apart are {:.1f} cm off each other",
-                                  100.0 * report.align[kSecond].median_m));
-  if (report.split_chi > kMostChi)
+  }
+  doubt_gap(report, kThird, kMostThirds, "a third of a second", reasons);
+  doubt_gap(report, kSecond, kMostSeconds, "a second", reasons);
+  if (report.split_chi > kMostChi) {
     reasons.push_back(fmt::format("depth and colour ask for paths that are {:.1f} cm apart in a second",
                                   100.0 * report.split_m));
-  if (report.expected_m > kMostExpected * report.distance_m)
-    reasons.push_back(fmt::format("the expected error of {:.1f} cm is more than {:.1f} % of the distance",
-                                  100.0 * report.expected_m, 100.0 * kMostExpected));
+  }
+  if (report.expected_m > kMostExpected.at(report.distance_m)) {
+    reasons.push_back(fmt::format("the error to expect is {:.1f} cm, {:.1f} % of the distance",
+                                  100.0 * report.expected_m, 100.0 * report.expected_m / report.distance_m));
+  }
 }
 
 }  // namespace plumbline::check

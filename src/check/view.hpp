@@ -46,7 +46,7 @@ class SmallCamera {
   std::vector<float> x_, y_;
 };
 
-/// Where a frame's images were taken.
+/// Poses at which a frame's images were taken.
 struct FramePoses {
   geometry::Rigid3 world_from_depth;
   geometry::Rigid3 world_from_color;

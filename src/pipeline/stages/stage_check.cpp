@@ -72,7 +72,7 @@ class CameraChanges {
 class CheckStage : public Stage {
  public:
   void declare(core::OptionTable& table) override {
-    table.boolean("enabled", enabled_, "Judge the final path by aligning pairs of frames anew");
+    table.boolean("enabled", enabled_, "Judge the final path by aligning pairs of frames again");
   }
 
   core::Result<void> start(const RunContext& context) override {
@@ -151,7 +151,7 @@ class CheckStage : public Stage {
     return {};
   }
 
-  /// What the run that this one continues had kept is gone with it.
+  /// Reads the frames again that the continued run had kept: its temporary file is gone.
   core::Result<void> read_again(const ResumedRun& run) {
     for (const FrameRow& row : run.rows) {
       if (row.state != "tracked") continue;
@@ -174,7 +174,7 @@ class CheckStage : public Stage {
 
 StageType check_stage() {
   return stage_type<CheckStage>(
-      "check", "Judges the final path: aligns pairs of frames anew and tells the error to expect",
+      "check", "Judges the final path: aligns pairs of frames again and tells the error to expect",
       Mode::kSerial, {{"frame", frame_port()}, {"track", track_port()}, {"map", map_port()}}, {}, true);
 }
 
