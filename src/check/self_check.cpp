@@ -69,6 +69,8 @@ DepthNoise noise_of(const std::vector<PairRows>& next) {
   return {std::max(kLeast_m, found.x()), std::max(0.0, found.y())};
 }
 
+constexpr double kShortestTear_m = 0.03;
+
 class Check {
  public:
   Check(const CheckInput& input, const core::Executor& executor) : input_(input), executor_(executor) {}
@@ -281,41 +283,42 @@ class Check {
   void set_steps(CheckReport& report) const {
     for (std::size_t w = 0; w < input_.ways.size(); ++w) {
       const geometry::Trajectory& path = input_.ways[w].path;
-      std::vector<double> steps;
+      std::vector<double> steps, speeds;
       for (std::size_t i = 1; i < path.size(); ++i) {
         steps.push_back(
             (path[i].world_from_camera.translation - path[i - 1].world_from_camera.translation).norm());
         report.path_m += steps.back();
+        speeds.push_back(steps.back() / std::max(1e-3, path[i].stamp - path[i - 1].stamp));
       }
       for (std::size_t i = 0; i < steps.size(); ++i) {
-        const double seconds = path[i + 1].stamp - path[i].stamp;
-        if (is_tear(steps, i, seconds, w, path[i].stamp, path[i + 1].stamp))
+        if (steps[i] > kShortestTear_m && is_tear(speeds, i, w, path[i].stamp, path[i + 1].stamp))
           report.tears.push_back({steps[i], path[i + 1].stamp, w});
       }
     }
   }
 
-  /// No camera is carried at 5 m/s; a step that is long beside its neighbours is a tear if the pictures
-  /// around it say so.
-  [[nodiscard]] bool is_tear(const std::vector<double>& steps, std::size_t i, double seconds, std::size_t way,
-                             double from, double to) const {
-    constexpr double kLeast_m = 0.03;
+  /// No camera is carried at 5 m/s; a step that is fast beside its neighbours is a tear if the pictures
+  /// around it say so, or show nothing in common.
+  [[nodiscard]] bool is_tear(const std::vector<double>& speeds, std::size_t i, std::size_t way, double from,
+                             double to) const {
     constexpr double kFastest_m_s = 5.0;
     constexpr double kTimesMedian = 10.0;
     constexpr double kContradicted_m = 0.02;
+    constexpr double kNeighbours_s = 0.1;
     constexpr std::size_t kAround = 15;
-    if (steps[i] <= kLeast_m) return false;
-    if (steps[i] > kFastest_m_s * seconds) return true;
-    const std::size_t begin = i > kAround ? i - kAround : 0, end = std::min(steps.size(), i + kAround + 1);
-    std::vector<double> around(steps.begin() + static_cast<std::ptrdiff_t>(begin),
-                               steps.begin() + static_cast<std::ptrdiff_t>(end));
-    if (steps[i] <= kTimesMedian * core::median(std::move(around))) return false;
-    return std::any_of(pairs_[kThird].begin(), pairs_[kThird].end(), [&](const AlignedPair& pair) {
+    if (speeds[i] > kFastest_m_s) return true;
+    const std::size_t begin = i > kAround ? i - kAround : 0, end = std::min(speeds.size(), i + kAround + 1);
+    std::vector<double> around(speeds.begin() + static_cast<std::ptrdiff_t>(begin),
+                               speeds.begin() + static_cast<std::ptrdiff_t>(end));
+    if (speeds[i] <= kTimesMedian * core::median(std::move(around))) return false;
+
+    for (const AlignedPair& pair : pairs_[kThird]) {
       const KeptFrame& a = frames_[anchors_[pair.first]].frame;
       const KeptFrame& b = frames_[anchors_[pair.second]].frame;
-      if (a.way != way || a.stamp > from + 1e-6 || b.stamp < to - 1e-6) return false;
+      if (a.way != way || a.stamp > from + 1e-6 || b.stamp < to - 1e-6) continue;
       return pair.contradicts || pair.both.shift_m() > kContradicted_m;
-    });
+    }
+    return to - from < kNeighbours_s;
   }
 
   const CheckInput& input_;

@@ -10,26 +10,28 @@ namespace plumbline::check {
 namespace {
 
 /// Coefficients of the expected error, found on the recordings that docs/method/trust.md names.
-constexpr double kGraph = 0.5;
-constexpr double kRevisits = 0.4;
-constexpr double kSplit = 0.1;
-constexpr double kLocal = 0.7;
-constexpr double kThirds = 1.2;
-constexpr double kSeconds = 0.6;
-constexpr double kP95 = 1.9;
+constexpr double kGraph = 1.3;
+constexpr double kRevisits = 0.15;
+constexpr double kLocal = 0.35;
+constexpr double kThirds = 1.3;
+constexpr double kSeconds = 0.5;
+constexpr double kP95 = 1.8;
 
-/// Limits beyond which a path is not trusted; a share is of the distance.
+/// Limits beyond which a path is not trusted; shares are of the distance.
 struct Limit {
   double metres;
   double share;
   [[nodiscard]] double at(double distance_m) const { return std::max(metres, share * distance_m); }
 };
-constexpr Limit kMostThirds{0.010, 0.007};
+constexpr Limit kMostThirds{0.011, 0.0065};
 constexpr Limit kMostSeconds{0.015, 0.010};
 constexpr Limit kMostLocal{0.020, 0.010};
-constexpr Limit kMostExpected{0.022, 0.012};
+/// Of the expected error: a share of the path's length, within bounds.
+constexpr double kMostOfPath = 0.0045;
+constexpr double kLeastLimit_m = 0.018;
+constexpr double kMostLimit_m = 0.09;
 constexpr double kMostRefused = 0.3;  ///< and one pair
-constexpr double kMostChi = 15.0;
+constexpr double kMostChi = 25.0;
 constexpr std::size_t kEnoughPairs = 4;
 
 double squared(double value) { return value * value; }
@@ -40,18 +42,24 @@ double worst_tear(const CheckReport& report) {
   return worst;
 }
 
+/// Median of a gap that has enough pairs.
+double typical_m(const CheckReport& report, Gap gap) {
+  return report.align[gap].pairs >= kEnoughPairs ? report.align[gap].median_m : 0.0;
+}
+
+/// Depth against colour and the shifts over three seconds add nothing to these.
 double expected_m(const CheckReport& r) {
-  return std::sqrt(
-      squared(r.told_m) + squared(kGraph * r.graph_m) + squared(kRevisits * r.align[kRevisit].median_m) +
-      squared(kSplit * r.split_m) + squared(kLocal * std::max(r.local.off_m, worst_tear(r))) +
-      squared(kThirds * r.align[kThird].median_m) + squared(kSeconds * r.align[kSecond].median_m));
+  return std::sqrt(squared(r.told_m) + squared(kGraph * r.graph_m) +
+                   squared(kRevisits * typical_m(r, kRevisit)) +
+                   squared(kLocal * std::max(r.local.off_m, worst_tear(r))) +
+                   squared(kThirds * r.align[kThird].median_m) + squared(kSeconds * typical_m(r, kSecond)));
 }
 
 /// "frames a second apart are 2.1 cm off each other", if that is beyond the limit.
 void doubt_gap(const CheckReport& report, Gap gap, const Limit& limit, const char* apart,
                std::vector<std::string>& reasons) {
   const GapReport& align = report.align[gap];
-  if (align.pairs < kEnoughPairs || align.median_m <= limit.at(report.distance_m)) return;
+  if (typical_m(report, gap) <= limit.at(report.distance_m)) return;
   reasons.push_back(
       fmt::format("frames {} apart are {:.1f} cm off each other", apart, 100.0 * align.median_m));
 }
@@ -90,14 +98,12 @@ void judge(CheckReport& report) {
   }
   doubt_gap(report, kThird, kMostThirds, "a third of a second", reasons);
   doubt_gap(report, kSecond, kMostSeconds, "a second", reasons);
-  if (report.split_chi > kMostChi) {
+  if (report.split_chi > kMostChi && report.align[kSecond].pairs >= kEnoughPairs) {
     reasons.push_back(fmt::format("depth and colour ask for paths that are {:.1f} cm apart in a second",
                                   100.0 * report.split_m));
   }
-  if (report.expected_m > kMostExpected.at(report.distance_m)) {
-    reasons.push_back(fmt::format("the error to expect is {:.1f} cm, {:.1f} % of the distance",
-                                  100.0 * report.expected_m, 100.0 * report.expected_m / report.distance_m));
-  }
+  if (report.expected_m > std::clamp(kMostOfPath * report.path_m, kLeastLimit_m, kMostLimit_m))
+    reasons.push_back(fmt::format("the error to expect is {:.1f} cm", 100.0 * report.expected_m));
 }
 
 }  // namespace plumbline::check

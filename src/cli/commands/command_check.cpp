@@ -41,6 +41,7 @@ double told_by(const fs::path& result) {
   std::size_t column = std::string::npos;
   double sum = 0.0;
   std::size_t count = 0;
+
   for (std::string line; std::getline(table, line);) {
     std::vector<std::string> cells;
     std::istringstream text(line);
@@ -50,6 +51,7 @@ double told_by(const fs::path& result) {
           static_cast<std::size_t>(std::find(cells.begin(), cells.end(), "sigma_position") - cells.begin());
       continue;
     }
+
     const auto sigma = column < cells.size() ? core::to_number(cells[column]) : std::nullopt;
     if (!sigma || !std::isfinite(*sigma)) continue;
     sum += *sigma * *sigma;
@@ -91,6 +93,7 @@ core::Result<check::FrameStore> keep_frames(const dataset::FrameSource& source, 
     if (use != check::FrameChoice::Use::kNone) wanted.push_back({i, use});
   }
 
+  // A few are decoded side by side, and shrunk at once.
   auto store = check::FrameStore::make(fs::temp_directory_path());
   if (!store) return store;
   constexpr std::size_t kChunk = 16;  // frames in memory
@@ -100,14 +103,17 @@ core::Result<check::FrameStore> keep_frames(const dataset::FrameSource& source, 
       const auto frame = source.read(wanted[begin + k].index);
       if (frame) chunk[k] = check::shrink(*frame, source.camera().color);
     });
+
     for (std::size_t k = 0; k < chunk.size(); ++k) {
       if (!chunk[k]) continue;  // the others will do
       const auto number = store->add(*chunk[k]);
       if (!number) return tl::unexpected<core::Error>(number.error());
       input.frames.push_back({*number, 0, chunk[k]->stamp, chunk[k]->depth_stamp, wanted[begin + k].use});
     }
+
     session.console().progress(begin + chunk.size(), wanted.size(), "frames");
   }
+
   session.console().end_progress();
   return store;
 }
@@ -123,6 +129,7 @@ core::Result<check::CheckReport> check_recording(const CheckRequest& request, Se
   input.ways.push_back({camera.color, camera.readout_s.value_or(0.0), std::move(*path)});
   input.max_dt_s = request.max_dt_s;
   input.told_m = told_by(request.path);
+
   const auto store = keep_frames(**source, request, session, input);
   if (!store) return tl::unexpected<core::Error>(store.error());
   if (input.frames.empty()) {
@@ -131,6 +138,7 @@ core::Result<check::CheckReport> check_recording(const CheckRequest& request, Se
                     "--max-dt may help",
                     request.path.string(), request.max_dt_s, request.recording));
   }
+
   input.read = [&store](std::size_t number) { return store->read(number); };
   return check::check_path(input, session.executor());
 }
@@ -169,6 +177,7 @@ void add_check(CLI::App& app, Session& session) {
       ->add_option("--camera", request->open.camera,
                    "Shipped calibration or file (default: the result's, else the recording's)")
       ->type_name("NAME|FILE");
+
   command->add_option("--format", request->open.format, "Layout of RECORDING (default: auto)")
       ->check(CLI::IsMember(dataset::layout_names()));
   command
@@ -176,6 +185,7 @@ void add_check(CLI::App& app, Session& session) {
                    "A frame has a pose if the path has one at most so many seconds away (default: 0.005)")
       ->type_name("S")
       ->check(CLI::Range(1e-6, 10.0));
+
   command->add_option("--json", request->json, "Also write the numbers into this file")->type_name("FILE");
   add_topic_option(*command, request->open);
   add_time_range(*command, request->open);
