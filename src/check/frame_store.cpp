@@ -78,6 +78,7 @@ SmallFrame shrink(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera)
   small.depth.create(size, CV_16UC1);
   std::vector<int> columns;
   for (int x = 0; x < size.width; ++x) columns.push_back(grid_pixel(x, camera.width, size.width));
+
   for (int y = 0; y < size.height; ++y) {
     const auto* from = frame.depth.ptr<float>(grid_pixel(y, camera.height, size.height));
     auto* to = small.depth.ptr<std::uint16_t>(y);

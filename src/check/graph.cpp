@@ -138,6 +138,7 @@ GraphReport put_together(const std::vector<GraphAnchor>& anchors, const std::vec
     after.push_back(equations.moved(a, found));
   }
   const Rigid3 fit = geometry::align_points(before, after);
+
   double sum = 0.0;
   for (std::size_t a = 0; a < anchors.size(); ++a) {
     report.shift_m[a] = (fit * before[a] - after[a]).norm();

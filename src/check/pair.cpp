@@ -39,6 +39,7 @@ std::vector<Equation> equations(const PairRows& rows, const sensor::Pinhole& cam
   if (use != Rows::kFlow) {
     const double alike =
         std::sqrt(2.0 * std::max(1.0, static_cast<double>(rows.depth.size()) / kIndependent));
+
     for (const DepthRow& d : rows.depth) {
       const double sigma = alike * noise(d.point.z());
       Equation e;
@@ -54,6 +55,7 @@ std::vector<Equation> equations(const PairRows& rows, const sensor::Pinhole& cam
       const std::array<Eigen::Vector3d, 2> slopes{
           Eigen::Vector3d(camera.fx / p.z(), 0.0, -camera.fx * p.x() / (p.z() * p.z())),
           Eigen::Vector3d(0.0, camera.fy / p.z(), -camera.fy * p.y() / (p.z() * p.z()))};
+
       for (int k = 0; k < 2; ++k) {
         const Eigen::Vector3d& slope = slopes[static_cast<std::size_t>(k)];
         Equation e;
@@ -94,6 +96,7 @@ PairRows FirstView::depth_rows(const View& second) const {
     const Eigen::Vector3d p = second_from_first * sample.point;
     const auto at = second.camera->grid_point(p);
     if (!at) continue;
+
     const auto normal = second.normal(*at);
     if (!normal) continue;
     ++rows.common;
@@ -131,6 +134,7 @@ Correction correction_of(const PairRows& rows, const sensor::Pinhole& second, co
   for (int round = 0; round < kRounds; ++round) {
     Matrix6d information = Matrix6d::Zero();
     Vector6d right = Vector6d::Zero();
+
     for (const Equation& e : all) {
       const double off = std::abs(e.value - e.row.dot(found.motion));
       if (off > kFarthest) continue;

@@ -36,6 +36,7 @@ RecalibratedFrame::RecalibratedFrame(const sensor::Pinhole& image, const sensor:
       const int v = static_cast<int>(std::floor((was.y() + 0.5) / step_y));
       const bool inside = u >= 0 && v >= 0 && u < size.width && v < size.height;
       depth_from_.at<cv::Vec2s>(y, x) = {static_cast<short>(inside ? u : -1), static_cast<short>(v)};
+
       const double one = forth.depth(was, now, 1.0);
       slope_.at<float>(y, x) = one > 0.0 ? static_cast<float>(1.0 / one - 1.0) : 0.0F;
     }

@@ -224,6 +224,7 @@ class Check {
     std::vector<GraphAnchor> anchors;
     for (const std::size_t a : anchors_)
       anchors.push_back({frames_[a].poses.world_from_depth, frames_[a].frame.way, frames_[a].frame.stamp});
+
     std::vector<PairLink> links;
     std::size_t refused = 0;
     for (const auto& pairs : pairs_) {

@@ -26,7 +26,7 @@ struct Limit {
 constexpr Limit kMostThirds{0.011, 0.0065};
 constexpr Limit kMostSeconds{0.015, 0.010};
 constexpr Limit kMostLocal{0.020, 0.010};
-/// Of the expected error: a share of the path's length, within bounds.
+/// The limit of the expected error is a share of the path's length, within bounds.
 constexpr double kMostOfPath = 0.0045;
 constexpr double kLeastLimit_m = 0.018;
 constexpr double kMostLimit_m = 0.09;
