@@ -112,6 +112,7 @@ void add_render(CLI::App& app, Session& session);
 void add_export(CLI::App& app, Session& session);
 void add_report(CLI::App& app, Session& session);
 void add_view(CLI::App& app, Session& session);
+void add_check(CLI::App& app, Session& session);
 void add_evaluate(CLI::App& app, Session& session);
 void add_evaluate_cloud(CLI::App& group, Session& session);  ///< the one below `evaluate`
 void add_synth(CLI::App& app, Session& session);

@@ -18,7 +18,7 @@ LAYERS = [
     ["sensor"],
     ["dataset", "features", "cloud", "optimize"],
     ["maps"],
-    ["tracking", "places", "evaluate", "synth", "viewer"],
+    ["tracking", "places", "evaluate", "synth", "viewer", "check"],
     ["mapping"],
     ["viz", "exports"],
     ["pipeline", "report"],

@@ -104,6 +104,12 @@ std::string text_of(const Json& summary) {
   const Json& frames = summary.at("frames");
   const auto count = [](const Json& number) { return number.get<std::size_t>(); };
   std::string text;
+  if (summary.contains("check")) {
+    const auto reason = summary.at("reason").get<std::string>();
+    text += reason.empty() ? summary.at("check").at("sentence").get<std::string>() + "\n"
+                           : fmt::format("Not trustworthy: {}.\n", reason);
+  }
+
   if (summary.at("stopped").get<bool>()) {
     text +=
         fmt::format("stopped after {} of {} frames; what was mapped so far is written\n",

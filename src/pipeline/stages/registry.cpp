@@ -16,6 +16,7 @@ void register_stages(StageRegistry& registry) {
 
   registry.add(maps_stage());
   registry.add(merge_stage());
+  registry.add(check_stage());
   registry.add(output_stage());
   registry.add_tap(frame_tap());
   registry.add_tap(features_tap());

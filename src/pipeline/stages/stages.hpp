@@ -36,6 +36,7 @@ StageType filter_stage();
 StageType store_stage();
 StageType maps_stage();
 StageType merge_stage();
+StageType check_stage();
 StageType output_stage();
 
 /// Taps, one a port type: tap_<name>.cpp.

@@ -39,7 +39,8 @@ std::string verdict_html(const ReportData& data) {
                     count_text(number_at(s, "/frames/read") + number_at(s, "/frames/unreadable")),
                     count_at(s, "/frames/longest_loss")));
   } else {
-    out += banner("good", "Trustworthy (exit code 0)", "The run found no reason to doubt this result.");
+    out += banner("good", "Trustworthy (exit code 0)",
+                  "The run found no reason to doubt this result. " + text_at(s, "/check/sentence"));
   }
 
   if (flag_at(s, "/stopped")) {
@@ -118,6 +119,7 @@ std::string facts(const ReportData& data) {
   return facts_html({{"Input", text_at(s, "/input")},
                      {"Robots", robots_text(data)},
                      {"Frames", frames_text(data)},
+                     {"Check of the path", text_at(s, "/check/sentence")},
                      {"Duration of the recording", duration_text(data.end_s - data.start_s)},
                      {"Pipeline", text_at(s, "/pipeline")},
                      {"Frame of the results", frame_of_results(data)},

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The corrections of all pairs put together.
+#include <vector>
+
+#include "pair.hpp"
+
+namespace plumbline::check {
+
+/// The correction of a pair; `first` and `second` are numbers of anchors.
+struct PairLink {
+  std::size_t first = 0;
+  std::size_t second = 0;
+  Correction correction;
+};
+
+struct GraphAnchor {
+  geometry::Rigid3 world_from_camera;
+  std::size_t way = 0;
+  double stamp = 0.0;
+};
+
+struct GraphReport {
+  double rms_m = 0.0;           ///< of the anchors' shifts, after a rigid alignment
+  std::vector<double> shift_m;  ///< by anchor
+  std::vector<double> weight;   ///< by link, 1: it agrees with the others, 0: it is refused
+};
+
+/// Anchors are by way, in order. Fewer than three, or no link: an empty report.
+GraphReport put_together(const std::vector<GraphAnchor>& anchors, const std::vector<PairLink>& links);
+
+}  // namespace plumbline::check

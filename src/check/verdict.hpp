@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "plumbline/check/self_check.hpp"
+
+namespace plumbline::check {
+
+/// The least shift at one place that stands out, metres.
+double least_local(const CheckReport& report);
+
+/// Fills in expected_m, p95_m, reasons and unchecked from the other numbers.
+void judge(CheckReport& report);
+
+}  // namespace plumbline::check
