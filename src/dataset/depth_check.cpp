@@ -78,6 +78,7 @@ core::Result<ScaleCheck> check_depth_scale(const FrameSource& source, const std:
   const double fit = fitting_depth_scale(median * scale);
   const std::string what =
       fmt::format("{}: with depth_scale {} the median depth is {:.4g} m", folder, scale, median);
+
   const std::string remedy =
       fit == scale ? std::string("; correct the camera file")
                    : fmt::format("; depth_scale {} would fit (median {:.2g} m); correct the camera file", fit,
@@ -90,11 +91,13 @@ core::Result<ScaleCheck> check_depth_scale(const FrameSource& source, const std:
   if (const double beyond = depth->share_beyond(kSensorReach_m); beyond > kMaxShareBeyondReach)
     add(fmt::format("{:.0f} % of the depth is beyond the {} m that depth cameras reach", 100.0 * beyond,
                     kSensorReach_m));
+
   const double nearest = nearest_of(source.camera());
   if (const double nearer = 1.0 - depth->share_beyond(nearest); nearer > kMaxShareTooNear)
     add(fmt::format("{:.0f} % is nearer than the {} m that they need", 100.0 * nearer, nearest));
   if (const auto step = depth->disparity_step(scale); step && (*step < kFinestStep || *step > kCoarsestStep))
     add(fmt::format("its steps ({:.2g} z^2) are those of no camera's disparity", *step));
+
   if (count == 0) return ScaleCheck{};
   return ScaleCheck{what + "; " + signs + remedy + " unless the scene is like that", count > 1};
 }

@@ -43,6 +43,7 @@ std::optional<double> DepthStatistics::disparity_step(double scale) const {
   constexpr double kBand = 1.15;
   std::vector<float> sorted = measured_;
   std::sort(sorted.begin(), sorted.end());
+
   std::vector<double> values;
   std::size_t seldom = 0;
   for (std::size_t k = 0, end = 0; k < sorted.size(); k = end) {
@@ -56,6 +57,7 @@ std::optional<double> DepthStatistics::disparity_step(double scale) const {
 
   // The median step of 1 / z in each band of distances.
   std::vector<double> bands;
+
   for (std::size_t k = 0, end = 0; k < values.size(); k = end) {
     std::vector<double> steps;
     for (end = k + 1; end < values.size() && values[end] < kBand * values[k]; ++end) {
@@ -65,6 +67,7 @@ std::optional<double> DepthStatistics::disparity_step(double scale) const {
     if (steps.size() >= 8 && steps.size() * 3 > (end - k) * 2)
       bands.push_back(core::median(std::move(steps)));
   }
+
   if (bands.size() < 3) return std::nullopt;
   const double step = core::median(bands);
   const auto alike =

@@ -48,6 +48,7 @@ Sign fixed_pattern_sign(const Samples& samples) {
   std::vector<cv::Mat> details;
   std::vector<Sample> all = samples.samples();
   double strong = 0.0;
+
   for (std::size_t k = 0; k < all.size() && details.size() < kFrames; ++k) {
     if (k % 4 != 0 && k % 4 != 3) continue;
     details.push_back(details_of(all[k].gray));
@@ -59,6 +60,7 @@ Sign fixed_pattern_sign(const Samples& samples) {
   const auto n = details.size();
   const std::size_t least = n - n / 8;
   std::size_t fixed = 0;
+
   for (int v = 0; v < details.front().rows; ++v) {
     std::array<const float*, kFrames> rows{};
     for (std::size_t k = 0; k < n; ++k) rows[k] = details[k].ptr<float>(v);
@@ -77,10 +79,10 @@ Sign fixed_pattern_sign(const Samples& samples) {
   const double of_picture = static_cast<double>(fixed) / static_cast<double>(details.front().total());
   sign.size = share;
   if (!grade(sign, {share / kShare, of_picture / kOfPicture, moved_share(all) / kMovedShare})) return sign;
+
   sign.text = fmt::format(
       "a pattern stays in the picture while the camera moves ({:.0f} % of all details, {:.2g} % of the "
-      "pixels): dots "
-      "of an infrared emitter, dirt on the lens or writing",
+      "pixels): dots of an infrared emitter, dirt on the lens or writing",
       100.0 * share, 100.0 * of_picture);
   sign.remedy =
       "record the colour camera's pictures, or switch the emitter off, clean the lens, leave out the writing";

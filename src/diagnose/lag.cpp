@@ -40,6 +40,7 @@ struct Motion {
 /// squares. `zero_is_none`: pixels of value 0 are left out.
 Eigen::Vector2d translation(const cv::Mat& a, const cv::Mat& b, float most, bool zero_is_none) {
   Eigen::Vector2d t = Eigen::Vector2d::Zero();
+
   for (int round = 0; round < 4; ++round) {
     Eigen::Matrix4d normal = Eigen::Matrix4d::Identity() * 1e-6;
     Eigen::Vector4d right = Eigen::Vector4d::Zero();
@@ -48,9 +49,11 @@ Eigen::Vector2d translation(const cv::Mat& a, const cv::Mat& b, float most, bool
         const double x = u + t.x(), y = v + t.y();
         const int iu = static_cast<int>(std::floor(x)), iv = static_cast<int>(std::floor(y));
         if (iu < 1 || iv < 1 || iu >= a.cols - 2 || iv >= a.rows - 2) continue;
+
         const auto* up = b.ptr<float>(iv);
         const auto* down = b.ptr<float>(iv + 1);
         const auto* row = a.ptr<float>(v);
+
         const float values[] = {up[iu],
                                 up[iu + 1],
                                 down[iu],
@@ -63,10 +66,12 @@ Eigen::Vector2d translation(const cv::Mat& a, const cv::Mat& b, float most, bool
         if (zero_is_none &&
             std::any_of(std::begin(values), std::end(values), [](float z) { return !(z > 0.0F); }))
           continue;
+
         const double fx = x - iu, fy = y - iv;
         const double there = (values[0] * (1.0 - fx) + values[1] * fx) * (1.0 - fy) +
                              (values[2] * (1.0 - fx) + values[3] * fx) * fy;
         const double gx = 0.5 * (values[6] - values[4]), gy = 0.5 * (values[8] - values[7]);
+
         const double difference = values[5] - there;
         const double w = std::abs(difference) < most ? 1.0 : most / std::abs(difference);
         const Eigen::Vector4d row4(gx, gy, values[5], 1.0);
@@ -74,6 +79,7 @@ Eigen::Vector2d translation(const cv::Mat& a, const cv::Mat& b, float most, bool
         right += w * difference * row4;
       }
     }
+
     const Eigen::Vector4d step = normal.ldlt().solve(right);
     t += step.head<2>().cwiseMax(-2.0).cwiseMin(2.0);
     t = t.cwiseMax(-8.0).cwiseMin(8.0);
@@ -171,10 +177,10 @@ std::vector<Sign> lag_signs(const Samples& samples) {
   const std::vector<Motion> motions = motions_of(samples.thumbnails());
   if (motions.size() < kLeastSteps) return {lags, late};
   const std::vector<Motion> quick = without_slow(motions);
-
-  // The best delay, and the best delay that grows.
   const double none = correlation(motions, 0.0, 0.0);
   double constant = none, best = none, delay = 0.0, begin = 0.0, drift = 0.0, quick_constant = 0.0;
+
+  // The best delay, and the best delay that grows.
   for (double d = -kMostDelay_s; d <= kMostDelay_s + 1e-9; d += kDelayStep_s) {
     quick_constant = std::max(quick_constant, correlation(quick, d, 0.0));
 
@@ -185,6 +191,7 @@ std::vector<Sign> lag_signs(const Samples& samples) {
   }
 
   const auto unexplained = [](double c) { return std::max(1e-3, 1.0 - c * c); };
+
   lags.size = drift;
   if (grade(lags,
             {std::abs(drift) / kDrift_s, (correlation(quick, begin, drift) - quick_constant) / kQuickGain,

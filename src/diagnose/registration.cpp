@@ -76,6 +76,7 @@ void add_steps(const cv::Mat& depth, bool across, double work_from_depth, std::v
 
       if (last >= 0 && i - last <= kMostGap) {
         const float before = z_at(o, last);
+
         if (std::abs(z - before) > kStep * std::min(z, before) + 0.03F) {
           const double at = z < before ? i - 0.5 : last + 0.5;
           const double u = (across ? at : o) * work_from_depth - 0.5 * (depth.cols * work_from_depth - 1.0);
@@ -170,11 +171,13 @@ Sign registration_sign(const Samples& samples) {
   Sign sign{"not_registered", "px"};
   std::vector<Frame> frames;
   const std::vector<Sample> all = samples.samples();
+
   for (std::size_t k = 0; k < all.size(); ++k) {
     if (k % 4 != 0 && k % 4 != 3) continue;
     const Sample& sample = all[k];
     const cv::Size size(kWorkWidth, kWorkWidth * sample.gray.rows / sample.gray.cols);
     Frame frame{relative_gradient(sample.gray, 1, 0, size), relative_gradient(sample.gray, 0, 1, size), {}};
+
     const double work_from_depth = static_cast<double>(kWorkWidth) / sample.depth.cols;
     add_steps(sample.depth, true, work_from_depth, frame.edges);
     add_steps(sample.depth, false, work_from_depth, frame.edges);
@@ -191,6 +194,7 @@ Sign registration_sign(const Samples& samples) {
                a_now = (a.at_none - a.mean) / a.spread;
   const double b_by_a = (score(frames, 1, a.best) - b.mean) / b.spread,
                b_now = (b.at_none - b.mean) / b.spread;
+
   const double gain = std::min(a_by_b - a_now, b_by_a - b_now);
   const double kept = std::max(a_now / std::max(a_by_b, 1e-3), b_now / std::max(b_by_a, 1e-3));
   const double off = std::min(distance(frames, a.best, {}), distance(frames, b.best, {}));
@@ -199,16 +203,15 @@ Sign registration_sign(const Samples& samples) {
   sign.size = off * px;
   if (!grade(sign, {std::min(a_by_b, b_by_a) / kFits, gain / kBetter, (1.0 - kept) / kLost, off / kOff}))
     return sign;
+
   const Transform& t = a_by_b - a_now > b_by_a - b_now ? b.best : a.best;
   sign.text = fmt::format(
       "colour and depth are not registered: edges of depth lie {:.0f} px off those of the pictures (depth "
-      "fits when it "
-      "is {:.2f} times as large and moved by {:+.0f}, {:+.0f} px)",
+      "fits when it is {:.2f} times as large and moved by {:+.0f}, {:+.0f} px)",
       sign.size, t.scale, t.x * px, t.y * px);
   sign.remedy = fmt::format(
       "record depth aligned to colour, or add the depth camera to camera.yaml (color_from_depth, and depth: "
-      "with fx "
-      "about {:.0f}; docs/guide/inputs.md)",
+      "with fx about {:.0f}; docs/guide/inputs.md)",
       samples.camera().fx / t.scale);
   return sign;
 }
