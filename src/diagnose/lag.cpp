@@ -22,9 +22,11 @@ constexpr std::size_t kLeastSteps = 30;
 
 // Evidence: correlations of all motion and of quick motion, and what they leave unexplained.
 constexpr double kDrift_s = 0.12;
-constexpr double kQuickGain = 0.15;
+constexpr double kQuickGain = 0.2;
+constexpr double kQuickTimes = 1.5;
 constexpr double kDelay_s = 0.1;
-constexpr double kQuickLate = 0.25;
+constexpr double kQuickLate = 0.3;
+constexpr double kLateTimes = 2.0;
 constexpr double kGain = 0.35;
 constexpr double kFit = 0.65;
 
@@ -193,9 +195,10 @@ std::vector<Sign> lag_signs(const Samples& samples) {
   const auto unexplained = [](double c) { return std::max(1e-3, 1.0 - c * c); };
 
   lags.size = drift;
-  if (grade(lags,
-            {std::abs(drift) / kDrift_s, (correlation(quick, begin, drift) - quick_constant) / kQuickGain,
-             (unexplained(constant) / unexplained(best) - 1.0) / kGain, best / kFit})) {
+  const double quick_lag = correlation(quick, begin, drift);
+  if (grade(lags, {std::abs(drift) / kDrift_s, (quick_lag - quick_constant) / kQuickGain,
+                   quick_lag / (kQuickTimes * std::max(quick_constant, 0.2)),
+                   (unexplained(constant) / unexplained(best) - 1.0) / kGain, best / kFit})) {
     lags.text = fmt::format(
         "depth falls behind colour in the course of the recording: by {:.2f} s at first, {:.2f} s at "
         "the end (correlation of their motions {:.2f}, with a constant delay {:.2f})",
@@ -205,8 +208,9 @@ std::vector<Sign> lag_signs(const Samples& samples) {
   }
 
   late.size = delay;
-  if (grade(late, {std::abs(delay) / kDelay_s,
-                   (correlation(quick, delay, 0.0) - correlation(quick, 0.0, 0.0)) / kQuickLate,
+  const double quick_late = correlation(quick, delay, 0.0), quick_none = correlation(quick, 0.0, 0.0);
+  if (grade(late, {std::abs(delay) / kDelay_s, (quick_late - quick_none) / kQuickLate,
+                   quick_late / (kLateTimes * std::max(quick_none, 0.2)),
                    (unexplained(none) / unexplained(constant) - 1.0) / kGain, constant / kFit})) {
     late.text = fmt::format(
         "depth is {:.2f} s {} than its stamps (correlation of its motion with colour's {:.2f}, as "

@@ -29,7 +29,7 @@ struct Variant {
 
 constexpr int kPointStep = 8;  // of the samples' depth
 constexpr double kCertainGain = 1.25;
-constexpr double kLeastAgree = 0.5;  // of the points, by the better reading
+constexpr double kLeastAgree = 0.3;  // of the points, by the better reading
 constexpr std::size_t kLeastPairs = 4;
 
 /// Share of a's points that b measures where the poses put them; the best of those in view and of all.

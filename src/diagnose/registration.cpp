@@ -24,7 +24,7 @@ constexpr float kStep = 0.12F;
 
 // Evidence: how far the mean gradient at the moved edges rises above that of all moves, in terms of their
 // spread.
-constexpr double kFits = 4.0;
+constexpr double kFits = 3.0;
 constexpr double kBetter = 2.3;  // than unmoved
 constexpr double kLost = 0.45;   // of that, without the move
 constexpr double kOff = 1.75;    // work pixels
