@@ -27,7 +27,7 @@ constexpr float kStep = 0.12F;
 constexpr double kFits = 3.0;
 constexpr double kBetter = 2.3;  // than unmoved
 constexpr double kLost = 0.45;   // of that, without the move
-constexpr double kOff = 1.75;    // work pixels
+constexpr double kOff = 3.0;     // work pixels: turning while depth is 20 ms late moves it by 2
 
 /// A step of depth: last pixel of the nearer side, in work pixels from the picture's centre.
 struct Edge {
