@@ -18,7 +18,7 @@ constexpr double kMostDelay_s = 0.3;
 constexpr double kMostDrift_s = 1.0;
 constexpr double kDelayStep_s = 0.03;
 constexpr double kDriftStep_s = 0.08;
-constexpr std::size_t kLeastSteps = 30;
+constexpr std::size_t kLeastSteps = 50;
 
 // Evidence: correlations of all motion and of quick motion, and what they leave unexplained.
 constexpr double kDrift_s = 0.12;
