@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "depth_statistics.hpp"
 #include "plumbline/dataset/summary.hpp"
@@ -17,6 +18,12 @@ constexpr std::size_t kDepthSamples = 5;
 // the median of a desk is still that of a room (1.3 m for 6.3 m), but its background lies far outside.
 constexpr double kSensorReach_m = 10.0;
 constexpr double kMaxShareBeyondReach = 0.1;
+constexpr double kMaxShareTooNear = 0.05;
+constexpr double kLeastMedian_m = 0.07;
+constexpr double kMostMedian_m = 40.0;
+// Steps of 1 / z, 1/m: an eighth of a pixel of a Kinect is 0.0029, a thirty-second of a RealSense's 0.0008.
+constexpr double kFinestStep = 0.0005;
+constexpr double kCoarsestStep = 0.007;
 // Depth cameras see from 40 to 120 degrees; parts of their images may be mapped, too.
 constexpr double kLeastView_deg = 8.0;
 constexpr double kMostView_deg = 160.0;
@@ -50,22 +57,49 @@ core::Result<DepthStatistics> sample_depth(const FrameSource& source, const std:
       "{}: the depth images hold no measurement at all (raw 0 and 65535 are not measurements)", folder));
 }
 
+/// Distance that a camera needs, by its name; files in units of 0.1 mm are those of cameras for close work.
+double nearest_of(const sensor::Camera& camera) {
+  constexpr double kCloseWork = 10000.0;
+  constexpr std::pair<const char*, double> kNearest[] = {{"kinect", 0.35}, {"tum_fr", 0.35}, {"xtion", 0.35},
+                                                         {"d405", 0.06},   {"d435", 0.15},   {"d455", 0.3}};
+  for (const auto& [name, metres] : kNearest) {
+    if (camera.name.find(name) != std::string::npos) return metres;
+  }
+  return camera.depth_scale >= kCloseWork ? 0.04 : 0.2;
+}
+
 }  // namespace
 
-core::Result<std::string> check_depth_scale(const FrameSource& source, const std::string& folder) {
+core::Result<ScaleCheck> check_depth_scale(const FrameSource& source, const std::string& folder) {
   const auto depth = sample_depth(source, folder);
   if (!depth) return tl::unexpected(depth.error());
-  const auto median = depth->median();
+  const double median = *depth->median();
   const double scale = source.camera().depth_scale;
-  const double fit = fitting_depth_scale(*median * scale);
-  const double beyond = depth->share_beyond(kSensorReach_m);
-  const bool too_far = beyond > kMaxShareBeyondReach && fit > scale;
-  if (*median >= 0.7 && *median <= 7.0 && !too_far) return "";
-  const std::string what = fmt::format(
-      "{}: with depth_scale {} the median depth is {:.4g} m; depth_scale {} would fit (median {:.2g} m)",
-      folder, scale, *median, fit, *median * scale / fit);
-  if (*median < 0.35 || *median > 20.0) return core::input_error(what + "; correct the camera file");
-  return what + "; correct the camera file unless the scene is like that";
+  const double fit = fitting_depth_scale(median * scale);
+  const std::string what =
+      fmt::format("{}: with depth_scale {} the median depth is {:.4g} m", folder, scale, median);
+
+  const std::string remedy =
+      fit == scale ? std::string("; correct the camera file")
+                   : fmt::format("; depth_scale {} would fit (median {:.2g} m); correct the camera file", fit,
+                                 median * scale / fit);
+  if (median < kLeastMedian_m || median > kMostMedian_m) return core::input_error(what + remedy);
+
+  std::string signs;
+  int count = 0;
+  const auto add = [&](const std::string& sign) { signs += (count++ > 0 ? ", " : "") + sign; };
+  if (const double beyond = depth->share_beyond(kSensorReach_m); beyond > kMaxShareBeyondReach)
+    add(fmt::format("{:.0f} % of the depth is beyond the {} m that depth cameras reach", 100.0 * beyond,
+                    kSensorReach_m));
+
+  const double nearest = nearest_of(source.camera());
+  if (const double nearer = 1.0 - depth->share_beyond(nearest); nearer > kMaxShareTooNear)
+    add(fmt::format("{:.0f} % is nearer than the {} m that they need", 100.0 * nearer, nearest));
+  if (const auto step = depth->disparity_step(scale); step && (*step < kFinestStep || *step > kCoarsestStep))
+    add(fmt::format("its steps ({:.2g} z^2) are those of no camera's disparity", *step));
+
+  if (count == 0) return ScaleCheck{};
+  return ScaleCheck{what + "; " + signs + remedy + " unless the scene is like that", count > 1};
 }
 
 core::Result<void> check_focal_lengths(const sensor::Camera& camera, const std::string& folder) {

@@ -37,6 +37,45 @@ double DepthStatistics::share_beyond(double depth_m) const {
   return static_cast<double>(beyond) / static_cast<double>(measured_.size());
 }
 
+std::optional<double> DepthStatistics::disparity_step(double scale) const {
+  constexpr std::size_t kLeastTimes = 20;  // that a depth is measured, to be a step
+  constexpr double kLeastUnits = 4.0;      // raw units from step to step
+  constexpr double kBand = 1.15;
+  std::vector<float> sorted = measured_;
+  std::sort(sorted.begin(), sorted.end());
+
+  std::vector<double> values;
+  std::size_t seldom = 0;
+  for (std::size_t k = 0, end = 0; k < sorted.size(); k = end) {
+    while (end < sorted.size() && sorted[end] == sorted[k]) ++end;
+    if (end - k >= kLeastTimes)
+      values.push_back(static_cast<double>(sorted[k]));
+    else
+      seldom += end - k;
+  }
+  if (seldom * 5 > sorted.size()) return std::nullopt;
+
+  // The median step of 1 / z in each band of distances.
+  std::vector<double> bands;
+
+  for (std::size_t k = 0, end = 0; k < values.size(); k = end) {
+    std::vector<double> steps;
+    for (end = k + 1; end < values.size() && values[end] < kBand * values[k]; ++end) {
+      const double units = (values[end] - values[end - 1]) * scale;
+      if (units >= kLeastUnits) steps.push_back(1.0 / values[end - 1] - 1.0 / values[end]);
+    }
+    if (steps.size() >= 8 && steps.size() * 3 > (end - k) * 2)
+      bands.push_back(core::median(std::move(steps)));
+  }
+
+  if (bands.size() < 3) return std::nullopt;
+  const double step = core::median(bands);
+  const auto alike =
+      std::count_if(bands.begin(), bands.end(), [&](double b) { return b > 0.7 * step && b < 1.4 * step; });
+  if (static_cast<std::size_t>(alike) * 4 < bands.size() * 3) return std::nullopt;
+  return step;
+}
+
 double DepthStatistics::missing_share() const {
   if (pixels_ == 0) return 1.0;
   return 1.0 - static_cast<double>(measured_.size()) / static_cast<double>(pixels_);

@@ -15,6 +15,9 @@ class DepthStatistics {
   [[nodiscard]] std::optional<double> median() const;
   /// Share of the measured pixels; 0 if there are none.
   [[nodiscard]] double share_beyond(double depth_m) const;
+  /// Step of 1 / z between depths that are measured, 1/m, where they are those of a disparity: the same at
+  /// several distances, and coarser than a raw unit; `scale`: raw units a metre.
+  [[nodiscard]] std::optional<double> disparity_step(double scale) const;
   [[nodiscard]] double missing_share() const;  ///< share of all pixels; 1 without pixels
 
  private:

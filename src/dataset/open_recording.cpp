@@ -265,11 +265,11 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
   const std::string name = name_of(place, folder);
   auto source = make_folder_source(name, *layout, *camera);
 
-  const auto doubt = check_depth_scale(*source, folder.string());
-  if (!doubt) return tl::unexpected(doubt.error());
-  if (doubt->empty()) return source;
-  log.warning(*doubt);
-  return make_folder_source(name, std::move(*layout), *camera, *doubt);
+  const auto scale = check_depth_scale(*source, folder.string());
+  if (!scale) return tl::unexpected(scale.error());
+  if (!scale->text.empty()) log.warning(scale->text);
+  if (!scale->doubted) return source;
+  return make_folder_source(name, std::move(*layout), *camera, scale->text);
 }
 
 }  // namespace plumbline::dataset

@@ -16,7 +16,7 @@ LAYERS = [
     ["core"],
     ["geometry"],
     ["sensor"],
-    ["dataset", "features", "cloud", "optimize"],
+    ["dataset", "features", "diagnose", "cloud", "optimize"],
     ["maps"],
     ["tracking", "places", "evaluate", "synth", "viewer", "check"],
     ["mapping"],

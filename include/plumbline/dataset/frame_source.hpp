@@ -161,9 +161,9 @@ std::vector<std::string> layout_names();
 
 /// Opens a folder or a bag (MCAP, rosbag2's database, ROS 1). Without a camera file, or a CameraInfo in a
 /// bag, the camera is a guess by the size of the images (Camera::guess; a warning), kUsage when no common
-/// device takes such. Checks camera, lists and the depth scale (median depth of some frames outside 0.35-20
-/// m: error; outside 0.7-7 m, or a tenth of the depths beyond the 10 m that depth cameras reach: warning;
-/// both name the depth_scale that would fit).
+/// device takes such. Checks camera, lists and the depth scale (median depth of some frames outside 0.07-40
+/// m: error; one sign that the scale is wrong: warning; two: FrameSource::doubt(); all name the depth_scale
+/// that would fit).
 core::Result<std::unique_ptr<FrameSource>> open_recording(const std::filesystem::path& folder,
                                                           const OpenOptions& options, core::Log& log);
 

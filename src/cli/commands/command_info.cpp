@@ -18,6 +18,7 @@
 #include "plumbline/dataset/recording_poses.hpp"
 #include "plumbline/dataset/summary.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
+#include "plumbline/diagnose/signs.hpp"
 #include "plumbline/maps/stored_run.hpp"
 #include "plumbline/net/ros2.hpp"
 #include "plumbline/pipeline/input.hpp"
@@ -136,6 +137,21 @@ void describe_path(const dataset::TrajectoryReading& reading) {
   for (const std::string& note : reading.notes) print("note: {}\n", note);
 }
 
+/// Mistakes that show in a few frames, without a path.
+void describe_signs(const dataset::FrameSource& source) {
+  diagnose::Samples samples(source.camera().color, source.size());
+  for (const std::size_t i : samples.wanted()) {
+    if (const auto frame = source.read(i)) samples.add(*frame);
+  }
+  std::vector<diagnose::Sign> signs = diagnose::signs_of(samples);
+  if (const auto truth = source.truth()) signs.push_back(diagnose::pose_sign(samples, *truth));
+  for (const diagnose::Sign& sign : signs) {
+    if (sign.certainty == diagnose::Certainty::kNone) continue;
+    print("sign: {}{}\n", sign.certainty == diagnose::Certainty::kLikely ? "perhaps " : "",
+          diagnose::sentence(sign));
+  }
+}
+
 core::Result<void> describe_recording(Session& session, InfoRequest& request) {
   const auto pipelines = session.pipelines_folder();
   if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
@@ -144,6 +160,7 @@ core::Result<void> describe_recording(Session& session, InfoRequest& request) {
                                            session.executor(), session.console());
   if (!source) return tl::unexpected<core::Error>(source.error());
   print("{}", dataset::to_text(**source));
+  describe_signs(**source);
   return {};
 }
 

@@ -94,7 +94,6 @@ void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& 
                   "(default), given maps with the recording's poses as they are, ignore leaves them out")
       ->type_name("prior|given|ignore")
       ->transform(one_of(uses));
-
   command
       .add_option("--pace", request.pace_hz,
                   "Play recordings at this rate, like a live camera (default: as fast as possible)")
@@ -112,11 +111,17 @@ void add_map(CLI::App& app, Session& session) {
   const auto inputs = std::make_shared<std::vector<std::string>>();
   const auto publish = std::make_shared<std::string>();
   const auto page = std::make_shared<PageAddress>();
+  const auto poses_are = std::make_shared<std::string>();
 
-  CLI::App* command = add_command(app, session, "map", "Map a recording: trajectory, dense cloud, pictures",
-                                  [&session, request, inputs, publish, page] {
-                                    return map(session, *request, *inputs, *publish, *page);
-                                  });
+  CLI::App* command =
+      add_command(app, session, "map", "Map a recording: trajectory, dense cloud, pictures",
+                  [&session, request, inputs, publish, page, poses_are] {
+                    if (!poses_are->empty()) {
+                      const bool given = request->open.poses == dataset::PoseUse::kGiven;
+                      request->overrides.push_back((given ? "poses.are=" : "read.poses_are=") + *poses_are);
+                    }
+                    return map(session, *request, *inputs, *publish, *page);
+                  });
 
   command
       ->add_option(
@@ -128,6 +133,12 @@ void add_map(CLI::App& app, Session& session) {
 
   command->add_option("-o,--output", request->output, "Folder for the result")->required()->type_name("OUT");
 
+  command
+      ->add_option(
+          "--poses-are", *poses_are,
+          "Convention of the poses that come with a recording: inverted (camera from world), opengl (y up, z "
+          "backwards), wxyz (quaternions begin with w)")
+      ->check(CLI::IsMember({"inverted", "opengl", "wxyz"}));
   add_publish_option(*command, *publish);
   add_map_options(*command, session, *request);
   add_live_options(*command, *page);

@@ -218,8 +218,8 @@ core::Result<std::unique_ptr<FrameSource>> open_live(const std::string& address,
       std::make_unique<LiveSource>(live, *camera, camera->color, std::vector<double>{camera->depth_delay_s});
   const auto doubt = check_depth_scale(*source, address);
   if (!doubt) return tl::unexpected(doubt.error());
-  if (!doubt->empty()) log.warning(*doubt);
-  live->doubt = *doubt;
+  if (!doubt->text.empty()) log.warning(doubt->text);
+  if (doubt->doubted) live->doubt = doubt->text;
 
   auto record = make_record(how, found->survey, *topics, *camera);
   if (!record) return tl::unexpected(record.error());

@@ -67,13 +67,17 @@ double tracked_percent(const Json& frames) {
   return all > 0.0 ? 100.0 * frames.at("tracked").get<double>() / all : 0.0;
 }
 
-/// The gravest doubt; lost frames are reported together with components that stayed apart.
+/// The gravest doubt: a mistake made with the recording comes first, as the cause of others; lost frames are
+/// reported together with components that stayed apart.
 std::string reason_of(const Graph& graph, const Json& summary) {
   std::vector<Doubt> reasons;
   for (const Node& node : graph.nodes) node.stage->doubt(summary, reasons);
   if (reasons.empty()) return {};
+  const auto rank = [](const Doubt& doubt) {
+    return doubt.about == Doubt::About::kRecording ? -1 : static_cast<int>(doubt.about);
+  };
   std::stable_sort(reasons.begin(), reasons.end(),
-                   [](const Doubt& x, const Doubt& y) { return x.about < y.about; });
+                   [&](const Doubt& x, const Doubt& y) { return rank(x) < rank(y); });
 
   std::string reason = reasons.front().text;
   const auto apart = std::find_if(reasons.begin(), reasons.end(), [](const Doubt& doubt) {

@@ -10,9 +10,12 @@
 #include "plumbline/core/csv.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
+#include "plumbline/diagnose/signs.hpp"
+#include "plumbline/geometry/pose_convention.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "stages/stages.hpp"
 #include "summary/sections.hpp"
+#include "summary/signs.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -24,6 +27,13 @@ class PosesStage : public Stage {
                "Poses in TUM format (stamp tx ty tz qx qy qz qw); {robot} in the name stands for each "
                "robot's name; empty: the recordings' own truth",
                core::EmptyValue::kAllowed);
+    table.choice<geometry::PoseConvention>("are", are_,
+                                           {{"world_from_camera", geometry::PoseConvention::kWorldFromCamera},
+                                            {"inverted", geometry::PoseConvention::kInverted},
+                                            {"opengl", geometry::PoseConvention::kOpenGl},
+                                            {"wxyz", geometry::PoseConvention::kWFirst}},
+                                           "Convention of the poses: inverted (camera from world), opengl (y "
+                                           "up, z backwards), wxyz (quaternions begin with w)");
     table.number("max_gap", max_gap_s_, {0.0, 10.0}, "s",
                  "Poses are interpolated; frames further than this from the nearest pose have none");
     table.number("keyframe_distance", keyframe_distance_m_, {0.0, 10.0}, "m", "Distance between keyframes");
@@ -33,6 +43,7 @@ class PosesStage : public Stage {
   core::Result<void> start(const RunContext& context) override {
     recordings_ = context.input.recordings;
     ways_.resize(recordings_->robots().size());
+
     if (several() && !file_.empty() && file_.find(kRobot) == std::string::npos) {
       return core::usage_error(fmt::format(
           "{}: are poses of one recording; write {} where the file's name has the robot's: poses/{}.txt",
@@ -42,8 +53,15 @@ class PosesStage : public Stage {
       auto poses = poses_of(robot);
       if (!poses) return tl::unexpected(poses.error());
       if (auto near = near_origin(file_of(robot), *poses); !near) return near;
-      ways_[static_cast<std::size_t>(robot.number)].poses = std::move(*poses);
+
+      for (geometry::StampedPose& pose : *poses)
+        pose.world_from_camera = geometry::read_by(are_, pose.world_from_camera);
+      Way& way = ways_[static_cast<std::size_t>(robot.number)];
+      way.poses = std::move(*poses);
+      way.samples = std::make_unique<diagnose::Samples>(
+          robot.camera.color, recordings_->live() ? 0 : recordings_->frames_of(robot.number));
     }
+    log_ = context.log;
     return {};
   }
 
@@ -51,6 +69,8 @@ class PosesStage : public Stage {
     const auto frame = io.input<sensor::RgbdFrame>("frame");
     const RobotInfo& robot = recordings_->robot(recordings_->robot_of(io.frame()));
     Way& way = ways_[static_cast<std::size_t>(robot.number)];
+    way.samples->add(*frame);
+
     const std::optional<geometry::Rigid3> pose = geometry::pose_at(way.poses, frame->stamp, max_gap_s_);
     const std::string stamp =
         fmt::format("{}{:.6f}", several() ? core::csv_field(robot.name) + "," : "", frame->stamp);
@@ -79,6 +99,11 @@ class PosesStage : public Stage {
   }
 
   core::Result<void> finish(StageIo& io) override {
+    for (const RobotInfo& robot : recordings_->robots()) {
+      Way& way = ways_[static_cast<std::size_t>(robot.number)];
+      add_signs(several() ? robot.name : "", {diagnose::pose_sign(*way.samples, way.poses)}, *log_, signs_);
+      way.samples.reset();
+    }
     map_.frame_columns = several() ? "robot,stamp,keyframe" : "stamp,keyframe";
     if (several()) map_.robots = recordings_->robots();
     std::sort(map_.keyframes.begin(), map_.keyframes.end(),
@@ -90,6 +115,7 @@ class PosesStage : public Stage {
   [[nodiscard]] bool takes_given_poses() const override { return true; }
   void report(Json& summary) const override {
     report_frames(map_.frames, summary["frames"]);
+    report_signs(signs_, summary);
     summary["keyframes"] = map_.keyframes.size();
     for (const RobotInfo& robot : map_.robots) {
       const Way& way = ways_[static_cast<std::size_t>(robot.number)];
@@ -98,6 +124,7 @@ class PosesStage : public Stage {
   }
   void doubt(const Json& summary, std::vector<Doubt>& reasons) const override {
     doubt_lost_frames(summary, reasons);
+    doubt_signs(signs_, reasons);
   }
 
  private:
@@ -105,6 +132,7 @@ class PosesStage : public Stage {
   /// Poses of one robot, and counts of its frames so far.
   struct Way {
     geometry::Trajectory poses;
+    std::unique_ptr<diagnose::Samples> samples;
     std::int32_t frames = 0;
     std::int32_t keyframes = 0;
     geometry::Rigid3 last;  ///< pose of the last keyframe
@@ -156,11 +184,14 @@ class PosesStage : public Stage {
   }
 
   std::string file_;
+  geometry::PoseConvention are_ = geometry::PoseConvention::kWorldFromCamera;
   double max_gap_s_ = 0.02;
   double keyframe_distance_m_ = 0.05;
   double keyframe_angle_rad_ = 0.05;
   const RobotRecordings* recordings_ = nullptr;
   std::vector<Way> ways_;  ///< by robot
+  std::vector<diagnose::Sign> signs_;
+  core::Log* log_ = nullptr;
   MapResult map_;
 };
 

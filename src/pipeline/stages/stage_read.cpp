@@ -6,9 +6,13 @@
 #include <utility>
 
 #include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/diagnose/signs.hpp"
+#include "plumbline/geometry/pose_convention.hpp"
+#include "plumbline/pipeline/robot_recordings.hpp"
 #include "results/resumed_run.hpp"
 #include "stages/stages.hpp"
 #include "summary/sections.hpp"
+#include "summary/signs.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -27,12 +31,31 @@ Json live_section(const dataset::LiveReport& live) {
 
 class ReadStage : public Stage {
  public:
+  void declare(core::OptionTable& table) override {
+    table.choice<geometry::PoseConvention>("poses_are", poses_are_,
+                                           {{"world_from_camera", geometry::PoseConvention::kWorldFromCamera},
+                                            {"inverted", geometry::PoseConvention::kInverted},
+                                            {"opengl", geometry::PoseConvention::kOpenGl},
+                                            {"wxyz", geometry::PoseConvention::kWFirst}},
+                                           "Convention of the recorder's own odometry: inverted (camera from "
+                                           "world), opengl (y up, z backwards), wxyz "
+                                           "(quaternions begin with w)");
+  }
   core::Result<void> start(const RunContext& context) override {
     source_ = context.input.source;
     log_ = context.log;
     asked_ = &context.asked;
     if (source_ == nullptr || (source_->size() == 0 && !source_->live()))
       return core::input_error("the recording has no frames");
+
+    if (const RobotRecordings* robots = context.input.recordings; robots != nullptr) {
+      recordings_ = robots;
+      for (const RobotInfo& robot : robots->robots()) {
+        const std::size_t frames = robots->live() ? 0 : robots->frames_of(robot.number);
+        samples_.push_back(std::make_unique<diagnose::Samples>(robot.camera.color, frames));
+      }
+    }
+
     if (context.resumed != nullptr) {
       resumed_ = context.resumed->rows.size();
       read_ = resumed_;
@@ -57,8 +80,14 @@ class ReadStage : public Stage {
       }
       return {};
     }
+
     ++read_;
-    if (frame->odometry) ++odometry_;
+    if (frame->odometry) {
+      frame->odometry = geometry::read_by(poses_are_, *frame->odometry);
+      ++odometry_;
+    }
+    if (recordings_ != nullptr)
+      samples_[static_cast<std::size_t>(recordings_->robot_of(io.frame()))]->add(*frame);
     io.output<sensor::RgbdFrame>("frame", std::make_shared<sensor::RgbdFrame>(std::move(*frame)));
     return {};
   }
@@ -79,6 +108,7 @@ class ReadStage : public Stage {
       return core::input_error(fmt::format("{}: none of {} frames could be read; see the warnings above",
                                            source_->name(), io.frame()));
     }
+    if (!asked_->stop_requested()) look_for_signs();
     return {};
   }
 
@@ -90,16 +120,44 @@ class ReadStage : public Stage {
     frames["missing"] = source_->missing();
     frames["odometry"] = odometry_.load();
     if (source_->live()) summary["live"] = live_section(source_->report());
+    report_signs(signs_, summary);
+    summary["unchecked"] = still_ ? Json{"camera", "scale"} : Json{"scale"};
   }
   void doubt(const Json& /*summary*/, std::vector<Doubt>& reasons) const override {
     if (const std::string doubt = source_->doubt(); !doubt.empty())
       reasons.push_back({Doubt::About::kRecording, doubt});
+    doubt_signs(signs_, reasons);
   }
 
  private:
+  void look_for_signs() {
+    still_ = !samples_.empty();
+    for (std::size_t r = 0; r < samples_.size(); ++r) {
+      std::vector<diagnose::Sign> signs = diagnose::signs_of(*samples_[r]);
+      const auto number = static_cast<std::int32_t>(r);
+      if (auto truth = odometry_ > 0 ? recordings_->truth_of(number) : std::nullopt) {
+        for (geometry::StampedPose& pose : *truth)
+          pose.world_from_camera = geometry::read_by(poses_are_, pose.world_from_camera);
+        signs.push_back(diagnose::pose_sign(*samples_[r], *truth));
+        // Odometry only starts each frame's search.
+        if (signs.back().certainty == diagnose::Certainty::kCertain)
+          signs.back().certainty = diagnose::Certainty::kLikely;
+      }
+      still_ = still_ && diagnose::stood_still(*samples_[r]);
+      samples_[r].reset();
+      add_signs(samples_.size() > 1 ? recordings_->robot(number).name : "", std::move(signs), *log_, signs_);
+    }
+    samples_.clear();
+  }
+
   const dataset::FrameSource* source_ = nullptr;
   core::Log* log_ = nullptr;
   const core::StopToken* asked_ = nullptr;
+  const RobotRecordings* recordings_ = nullptr;
+  std::vector<std::unique_ptr<diagnose::Samples>> samples_;  ///< by robot
+  std::vector<diagnose::Sign> signs_;
+  bool still_ = false;
+  geometry::PoseConvention poses_are_ = geometry::PoseConvention::kWorldFromCamera;
   std::size_t resumed_ = 0;
   std::atomic<std::size_t> read_{0};
   std::atomic<std::size_t> unreadable_{0};

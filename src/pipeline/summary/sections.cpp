@@ -22,6 +22,8 @@ Json empty_sections() {
           {"pipeline", ""},
           {"trustworthy", true},
           {"reason", ""},
+          {"unchecked", none},
+          {"signs", none},
           {"stopped", false},
           {"frames",
            {{"available", 0},

@@ -423,27 +423,63 @@ class DepthScale : public RecordingTest {
 };
 
 TEST_F(DepthScale, ErrorNamesTheScaleThatFits) {
-  write(9500, "50000");
-  EXPECT_THAT(open_error(), AllOf(HasSubstr("0.19 m"), HasSubstr("depth_scale 5000 would fit")));
+  write(1900, "50000");
+  EXPECT_THAT(open_error(), AllOf(HasSubstr("0.038 m"), HasSubstr("depth_scale 1000 would fit")));
   write(9500, "1");
   EXPECT_THAT(open_error(), HasSubstr("depth_scale 5000 would fit"));
   write(14000, "1");
   EXPECT_THAT(open_error(), HasSubstr("depth_scale 5000 would fit"));
-  write(1900, "100000");
-  EXPECT_THAT(open_error(), HasSubstr("depth_scale 1000 would fit"));
-  write(500, "5000");
-  EXPECT_THAT(open_error(), HasSubstr("depth_scale 256 would fit"));
+  write(300, "5000");
+  EXPECT_THAT(open_error(), HasSubstr("depth_scale 100 would fit"));
   write(2, "5000");
   EXPECT_THAT(open_error(), HasSubstr("depth_scale 1 would fit"));
 }
 
-TEST_F(DepthScale, WarningNamesTheScaleThatFits) {
-  write(9500, "1000");
-  EXPECT_TRUE(open());
-  EXPECT_THAT(log_.warnings, AllOf(HasSubstr("9.5 m"), HasSubstr("depth_scale 5000 would fit")));
-  write(2500, "5000");
-  EXPECT_TRUE(open());
-  EXPECT_THAT(log_.warnings, AllOf(HasSubstr("0.5 m"), HasSubstr("depth_scale 1000 would fit")));
+TEST_F(DepthScale, OneSignWarnsAndNamesTheScaleThatFits) {
+  write(12500, "1000");
+  const auto far = open();
+  ASSERT_TRUE(far);
+  EXPECT_EQ((*far)->doubt(), "");
+  EXPECT_THAT(log_.warnings, AllOf(HasSubstr("12.5 m"), HasSubstr("beyond the 10 m"),
+                                   HasSubstr("depth_scale 5000 would fit")));
+  log_.warnings.clear();
+  write(500, "5000");
+  ASSERT_TRUE(open());
+  EXPECT_THAT(log_.warnings, AllOf(HasSubstr("0.1 m"), HasSubstr("nearer than the 0.2 m")));
+}
+
+/// A right scan of something close, or of a hall, has an unusual median and nothing else.
+TEST_F(DepthScale, AMedianAloneIsNoSign) {
+  for (const int raw : {2000, 2500, 45000}) {
+    write(raw, "5000");
+    ASSERT_TRUE(open());
+    EXPECT_EQ(log_.warnings, "") << raw;
+  }
+  write(1000, "10000");  // 0.1 m, in the unit of cameras for close work
+  ASSERT_TRUE(open());
+  EXPECT_EQ(log_.warnings, "");
+}
+
+/// A Kinect's steps of an eighth of a pixel, ten times as large: its scale is a tenth of what is right.
+TEST_F(DepthScale, StepsOfDisparityAreASecondSign) {
+  const auto slope = [&](const std::string& scale) {
+    write(5000, scale);
+    for (int i = 0; i < 3; ++i) {
+      cv::Mat raw(48, 64, CV_16UC1);
+      for (int k = 0; k < 48 * 64; ++k)
+        raw.at<std::uint16_t>(k / 64, k % 64) =
+            static_cast<std::uint16_t>(std::lround(5000.0 / (0.12 + 0.0028 * (k % 390))));
+      cv::imwrite((folder_ / "depth" / (std::to_string(i) + ".png")).string(), raw);
+    }
+  };
+  slope("5000");
+  const auto right = open();
+  ASSERT_TRUE(right);
+  EXPECT_EQ(log_.warnings, "");
+  slope("500");
+  const auto wrong = open();
+  ASSERT_TRUE(wrong);
+  EXPECT_THAT((*wrong)->doubt(), AllOf(HasSubstr("beyond the 10 m"), HasSubstr("no camera's disparity")));
 }
 
 TEST_F(DepthScale, BackgroundBeyondEveryDepthCamerasReachIsDoubted) {

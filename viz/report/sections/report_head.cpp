@@ -114,12 +114,28 @@ std::string robots_text(const ReportData& data) {
   return out.empty() ? in : in + "; mapped, but not in the result: " + out;
 }
 
+/// Mistakes that the run looked for, and what is not checked.
+std::string mistakes_text(const nlohmann::ordered_json& s) {
+  std::string found, unchecked;
+  std::size_t tested = 0;
+  for (const auto& sign : list_at(s, "/signs")) {
+    ++tested;
+    const std::string text = text_at(sign, "/text"), certainty = text_at(sign, "/certainty");
+    if (!text.empty()) found += fmt::format("{} ({}); ", text, certainty);
+  }
+  for (const auto& what : list_at(s, "/unchecked"))
+    unchecked += (unchecked.empty() ? "" : ", ") + text_at(what, "");
+  if (found.empty()) found = fmt::format("none of {} that were looked for; ", tested);
+  return found + "unchecked: " + (unchecked.empty() ? "nothing" : unchecked);
+}
+
 std::string facts(const ReportData& data) {
   const auto& s = data.summary;
   return facts_html({{"Input", text_at(s, "/input")},
                      {"Robots", robots_text(data)},
                      {"Frames", frames_text(data)},
                      {"Check of the path", text_at(s, "/check/sentence")},
+                     {"Mistakes", mistakes_text(s)},
                      {"Duration of the recording", duration_text(data.end_s - data.start_s)},
                      {"Pipeline", text_at(s, "/pipeline")},
                      {"Frame of the results", frame_of_results(data)},
