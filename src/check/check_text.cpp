@@ -42,18 +42,24 @@ std::string to_text(const CheckReport& report) {
   };
   line("expected error", fmt::format("{}, 95 %: {}", mm(report.expected_m), mm(report.p95_m)));
   line("told by the estimate", report.told_m > 0.0 ? mm(report.told_m) : "nothing");
+
   line("graph of corrections", fmt::format("{} RMS over {} frames", mm(report.graph_m), report.anchors));
+
+  // How far frames are off, by the time between them.
   for (std::size_t gap = 0; gap < kGaps; ++gap) {
     const GapReport& align = report.align[gap];
     line(kTexts[gap], align.pairs == 0 ? "none"
                                        : fmt::format("{} off, 90 %: {}, {} pairs", mm(align.median_m),
                                                      mm(align.p90_m), align.pairs));
   }
+
+  // Contradictions of the path as a whole, and where.
   line("pairs refused", fmt::format("{:.1f} %", 100.0 * report.refused));
   line("depth against colour", fmt::format("{}, {:.1f} sigma", mm(report.split_m), report.split_chi));
   line("worst place", report.local.off_m > 0.0
                           ? fmt::format("{} off at {:.2f} s", mm(report.local.off_m), report.local.stamp)
                           : "none stands out");
+
   for (const BadPlace& tear : report.tears)
     line("tear", fmt::format("{} at {:.3f} s", mm(tear.off_m), tear.stamp));
   line("noise of depth",

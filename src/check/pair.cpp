@@ -142,6 +142,7 @@ Correction correction_of(const PairRows& rows, const sensor::Pinhole& second, co
       information.noalias() += e.row * (weight * e.row.transpose());
       right.noalias() += weight * e.value * e.row;
     }
+
     found.information = information;
     found.motion = (information + weak).ldlt().solve(right);
   }

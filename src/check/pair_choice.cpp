@@ -68,15 +68,20 @@ void add_revisits(const std::vector<PosedFrame>& frames, const std::vector<std::
                   std::vector<Partners>& pairs) {
   std::vector<Revisit> found;
   std::set<std::pair<std::size_t, std::size_t>> taken;
+
   for (std::size_t a = 0; a < anchors.size(); ++a) {
     const PosedFrame& first = frames[anchors[a]];
     const Eigen::Vector3d at = first.poses.world_from_depth.translation;
     std::vector<std::pair<double, std::size_t>> partners;
+
+    // Anchors of another time that see the same surface.
     for (std::size_t b = 0; b < anchors.size(); ++b) {
       const PosedFrame& second = frames[anchors[b]];
+
       const bool other = first.frame.way != second.frame.way;
       if (!other && std::abs(first.frame.stamp - second.frame.stamp) < kRevisitAfter_s) continue;
       if (outlines[a].points.empty() || outlines[b].points.empty()) continue;
+
       const double apart = (at - second.poses.world_from_depth.translation).norm();
       if (apart > outlines[a].distance_m + outlines[b].distance_m) continue;
       const double seen = overlap(outlines[a], at, second.poses, cameras[second.frame.way]);
@@ -92,12 +97,14 @@ void add_revisits(const std::vector<PosedFrame>& frames, const std::vector<std::
         const KeptFrame& y = frames[anchors[c]].frame;
         return x.way == y.way && std::abs(x.stamp - y.stamp) < 2.0;
       });
+
       if (near) continue;
       chosen.push_back(b);
       if (taken.insert(std::minmax(a, b)).second) found.push_back({chosen.size(), a, b});
       if (chosen.size() == kMostAnAnchor) break;
     }
   }
+
   for (const Revisit& revisit : thinned(std::move(found)))
     pairs[revisit.first].by_gap[kRevisit].push_back(revisit.second);
 }
@@ -138,12 +145,14 @@ std::vector<Partners> choose_pairs(const std::vector<PosedFrame>& frames,
 
     for (std::size_t gap = 0; gap < kRevisit; ++gap) {
       if (a % kEvery[gap] != 0) continue;
+
       // The anchor nearest to that time, if there is one about then.
       std::size_t best = a;
       for (std::size_t b = a + 1; b < anchors.size() && frames[anchors[b]].frame.way == first.way; ++b) {
         const auto off = [&](std::size_t c) {
           return std::abs(frames[anchors[c]].frame.stamp - first.stamp - kGaps_s[gap]);
         };
+
         if (frames[anchors[b]].frame.stamp - first.stamp > 1.4 * kGaps_s[gap]) break;
         if (off(b) > 0.4 * kGaps_s[gap]) continue;
         if (best != a && off(b) >= off(best)) break;
@@ -152,6 +161,7 @@ std::vector<Partners> choose_pairs(const std::vector<PosedFrame>& frames,
       if (best != a) pairs[a].by_gap[gap].push_back(best);
     }
   }
+
   add_revisits(frames, anchors, outlines, cameras, pairs);
   return pairs;
 }

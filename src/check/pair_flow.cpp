@@ -48,18 +48,24 @@ Warp warp_into(const View& first, const View& second) {
     auto* pixel = warp.pixels.ptr<cv::Vec2f>(y);
     auto* depth = warp.depth.ptr<float>(y);
     const Eigen::Vector3f row = r.col(1) * first.camera->rows()[static_cast<std::size_t>(y)] + r.col(2);
+
+    // Each point of the row, seen from the second camera.
     for (int x = 0; x < warp.depth.cols; ++x) {
       const float far = kMetres * static_cast<float>(z[x]);
       const float ray = columns[static_cast<std::size_t>(x)];
       float px = far * (r(0, 0) * ray + row.x()) + s.x();
       float py = far * (r(1, 0) * ray + row.y()) + s.y();
       float pz = far * (r(2, 0) * ray + row.z()) + s.z();
+
       const bool there = z[x] > 0 && pz > static_cast<float>(SmallCamera::kNearest_m);
+
+      // The camera moved on until the row was read in which the point is seen.
       if (readout > 0.0F) {
         const float share = (fy * py / pz + cy) * per_row - 0.5F;
         const float mx = v.x() + w.y() * pz - w.z() * py;
         const float my = v.y() + w.z() * px - w.x() * pz;
         const float mz = v.z() + w.x() * py - w.y() * px;
+
         px -= share * mx;
         py -= share * my;
         pz -= share * mz;
@@ -79,12 +85,15 @@ cv::Mat seen_by(const View& second, const Warp& warp) {
     const auto* pixel = warp.pixels.ptr<cv::Vec2f>(y);
     const auto* depth = warp.depth.ptr<float>(y);
     auto* to = seen.ptr<std::uint8_t>(y);
+
+    // A pixel counts where the second depth has the same surface.
     for (int x = 0; x < seen.cols; ++x) {
       const float u = pixel[x][0], v = pixel[x][1];
       to[x] = 0;
       if (!(u >= 1.0F && v >= 1.0F && u < static_cast<float>(size.width - 2) &&
             v < static_cast<float>(size.height - 2)))
         continue;
+
       const float z = kMetres * static_cast<float>(second.frame.depth.at<std::uint16_t>(
                                     static_cast<int>(v + 0.5F), static_cast<int>(u + 0.5F)));
       to[x] = std::abs(z - depth[x]) < 0.03F + 0.03F * depth[x] ? 255 : 0;
@@ -134,6 +143,8 @@ void FirstView::add_flow(const View& second, PairRows& rows) {
   if (!prepared_) prepare_flow();
   const Warp warp = warp_into(view_, second);
   const cv::Mat seen = seen_by(second, warp);
+
+  // Corners that the second view sees.
   std::vector<cv::Point2f> from;
   for (const cv::Point2f& corner : corners_) {
     if (all_set(seen, corner)) from.push_back(corner);
@@ -149,6 +160,7 @@ void FirstView::add_flow(const View& second, PairRows& rows) {
   cv::buildOpticalFlowPyramid(gray, pyramid, kWindow, kLevels);
 
   const cv::TermCriteria enough(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 20, 0.02);
+
   std::vector<cv::Point2f> to, back;
   std::vector<std::uint8_t> forward_found, back_found;
   std::vector<float> unused;
@@ -158,6 +170,7 @@ void FirstView::add_flow(const View& second, PairRows& rows) {
   const Rigid3 second_from_first = second.poses.world_from_depth.inverse() * view_.poses.world_from_depth;
   constexpr double kMostBack_px = 0.3;
   constexpr double kMost_px = 12.0;
+
   std::vector<FlowRow> flow;
   for (std::size_t i = 0; i < from.size(); ++i) {
     if (forward_found[i] == 0 || back_found[i] == 0 || cv::norm(back[i] - from[i]) > kMostBack_px) continue;

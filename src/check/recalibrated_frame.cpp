@@ -52,6 +52,8 @@ SmallFrame RecalibratedFrame::operator()(const SmallFrame& frame) const {
   cv::remap(frame.gray, changed.gray, gray_from_, cv::Mat(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
   changed.depth =
       cv::Mat(frame.depth.size(), CV_16UC1, cv::Scalar(0));  // zeros() would write into the shared pixels
+
+  // Each pixel of depth from where it was, with the correction of its distance.
   for (int y = 0; y < frame.depth.rows; ++y) {
     for (int x = 0; x < frame.depth.cols; ++x) {
       const auto& from = depth_from_.at<cv::Vec2s>(y, x);

@@ -39,6 +39,8 @@ DepthNoise noise_of(const std::vector<PairRows>& next) {
   constexpr std::array<double, 8> kBins{0.0, 0.7, 1.2, 1.8, 2.5, 3.5, 5.0, 9.0};
   constexpr std::size_t kFewest = 300;
   constexpr double kLeast_m = 2e-4;
+
+  // Residuals of neighbouring frames by distance.
   std::array<std::vector<double>, 7> offs, depths;
   for (const PairRows& rows : next) {
     for (const DepthRow& row : rows.depth) {
@@ -54,16 +56,21 @@ DepthNoise noise_of(const std::vector<PairRows>& next) {
   std::size_t bins = 0;
   for (std::size_t i = 0; i < offs.size(); ++i) {
     if (offs[i].size() < kFewest) continue;
+
+    // Its standard deviation, by the median.
     const double middle = core::median(offs[i]);
     for (double& off : offs[i]) off = std::abs(off - middle);
     const double sigma = 1.4826 / std::sqrt(2.0) * core::median(offs[i]);
     const double z = core::median(depths[i]);
+
+    // One equation of the fit.
     const double weight = 1.0 / std::max(sigma, 3e-4);
     const Eigen::Vector2d row = weight * Eigen::Vector2d(1.0, z * z);
     left += row * row.transpose();
     right += weight * sigma * row;
     ++bins;
   }
+
   if (bins == 0) return {};
   const Eigen::Vector2d found = (left + 1e-9 * Eigen::Matrix2d::Identity()).ldlt().solve(right);
   return {std::max(kLeast_m, found.x()), std::max(0.0, found.y())};
@@ -144,10 +151,13 @@ class Check {
       auto loaded = view(anchors_[a]);
       if (!loaded) return tl::unexpected(loaded.error());
       FirstView first(std::move(*loaded));
+
+      // Its partners, one gap after the other.
       for (std::size_t gap = 0; gap < kGaps; ++gap) {
         for (const std::size_t b : partners_[a].by_gap[gap]) {
           const auto second = view(anchors_[b]);
           if (!second) return tl::unexpected(second.error());
+
           if (auto pair = align(first, *second, gap)) {
             pair->first = a;
             pair->second = b;

@@ -82,20 +82,27 @@ void judge(CheckReport& report) {
   if (report.align[kRevisit].pairs == 0) report.unchecked.emplace_back("drift: nothing was seen twice");
 
   std::vector<std::string>& reasons = report.reasons;
+
+  // The largest jump is named.
   for (const BadPlace& tear : report.tears) {
     if (tear.off_m < worst_tear(report)) continue;
     reasons.push_back(fmt::format("the path jumps by {:.1f} cm at {:.3f} s", 100.0 * tear.off_m, tear.stamp));
     break;
   }
+
+  // Pairs of frames that do not fit, all over the path or at one place.
   if (report.refused > kMostRefused + 1.0 / static_cast<double>(report.pairs)) {
     reasons.push_back(
         fmt::format("{:.0f} % of the pairs of frames do not fit the path", 100.0 * report.refused));
   }
+
   if (report.local.off_m > kMostLocal.at(report.distance_m)) {
     reasons.push_back(
         fmt::format("around {:.2f} s the path is off by about {:.1f} cm: frames a second apart do not fit",
                     report.local.stamp, 100.0 * report.local.off_m));
   }
+
+  // All pairs of one gap.
   doubt_gap(report, kThird, kMostThirds, "a third of a second", reasons);
   doubt_gap(report, kSecond, kMostSeconds, "a second", reasons);
   if (report.split_chi > kMostChi && report.align[kSecond].pairs >= kEnoughPairs) {

@@ -86,6 +86,8 @@ core::Result<check::FrameStore> keep_frames(const dataset::FrameSource& source, 
   };
   std::vector<Wanted> wanted;
   check::FrameChoice choice;
+
+  // Frames with a pose that the choice takes.
   for (std::size_t i = 0; i < source.size(); ++i) {
     const double stamp = source.info(i).stamp;
     if (!check::has_pose(input.ways.front().path, stamp, request.max_dt_s)) continue;
@@ -171,6 +173,8 @@ void add_check(CLI::App& app, Session& session) {
       ->add_option("PATH", request->path,
                    "The result of plumbline map, or a path by another program (TUM or EuRoC format)")
       ->required();
+
+  // The recording, and how it is read.
   command->add_option("RECORDING", request->recording, "The recording that the path belongs to, as for map")
       ->required();
   command

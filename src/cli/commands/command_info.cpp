@@ -224,6 +224,8 @@ void add_info(CLI::App& app, Session& session) {
           "INPUT", request->input,
           "A recording, a ROS bag, ros2://DOMAIN, a result folder, map.db, a cloud file or synth:SCENE")
       ->required();
+
+  // How a recording is read.
   command->add_option("--camera", request->open.camera, "Shipped calibration or file")
       ->type_name("NAME|FILE");
   add_topic_option(*command, request->open);

@@ -68,6 +68,8 @@ void add_view(CLI::App& app, Session& session) {
                   [&session, state] { return run_view(*state, session); });
   command->add_option("OUT", state->request.input, "A result folder, map.db, or a cloud file")->required();
   command->add_option("OTHER", state->other, "Second result, shown over the first");
+
+  // Where it is served, and how much of it.
   command
       ->add_option("--http", state->http,
                    "Address to serve the page at, until Ctrl-C (default: 127.0.0.1:8080)")

@@ -105,6 +105,8 @@ class CheckStage : public Stage {
       const auto readout = cameras[r].now().readout_s;
       input.ways.push_back(
           {robots[r].camera.color, readout.value_or(0.0), trajectory_of(*map, robots[r].number)});
+
+      // Frames that have a pose, with the camera that was used for each.
       const auto frames = frames_by_stamp(*map, robots[r].number);
       for (check::KeptFrame frame : kept_[r]) {
         const auto found = frames.find(frame.stamp);

@@ -240,6 +240,8 @@ class OutputStage : public Stage {
     for (const RobotInfo& robot : map.robots) names[robot.number] = robot.name;
     core::OutputFile out(file);
     out.write("robot,keyframe,stamp,tx,ty,tz,qx,qy,qz,qw,sigma_position,sigma_rotation,points,lines,edges\n");
+
+    // Pose, and its accuracy where it is known.
     for (std::size_t i = 0; i < map.keyframes.size(); ++i) {
       const maps::KeyframePose& keyframe = map.keyframes[i];
       const Eigen::Vector3d& t = keyframe.world_from_camera.translation;

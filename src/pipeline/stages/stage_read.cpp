@@ -135,6 +135,8 @@ class ReadStage : public Stage {
     for (std::size_t r = 0; r < samples_.size(); ++r) {
       std::vector<diagnose::Sign> signs = diagnose::signs_of(*samples_[r]);
       const auto number = static_cast<std::int32_t>(r);
+
+      // Poses that came along, as they were read.
       if (auto truth = odometry_ > 0 ? recordings_->truth_of(number) : std::nullopt) {
         for (geometry::StampedPose& pose : *truth)
           pose.world_from_camera = geometry::read_by(poses_are_, pose.world_from_camera);
@@ -143,6 +145,7 @@ class ReadStage : public Stage {
         if (signs.back().certainty == diagnose::Certainty::kCertain)
           signs.back().certainty = diagnose::Certainty::kLikely;
       }
+
       still_ = still_ && diagnose::stood_still(*samples_[r]);
       samples_[r].reset();
       add_signs(samples_.size() > 1 ? recordings_->robot(number).name : "", std::move(signs), *log_, signs_);
