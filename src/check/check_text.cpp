@@ -45,7 +45,7 @@ std::string to_text(const CheckReport& report) {
 
   line("graph of corrections", fmt::format("{} RMS over {} frames", mm(report.graph_m), report.anchors));
 
-  // How far frames are off, by the time between them.
+  // Distances by which frames are off, by the time between them.
   for (std::size_t gap = 0; gap < kGaps; ++gap) {
     const GapReport& align = report.align[gap];
     line(kTexts[gap], align.pairs == 0 ? "none"

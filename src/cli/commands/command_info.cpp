@@ -225,7 +225,7 @@ void add_info(CLI::App& app, Session& session) {
           "A recording, a ROS bag, ros2://DOMAIN, a result folder, map.db, a cloud file or synth:SCENE")
       ->required();
 
-  // How a recording is read.
+  // The layout and the camera of a recording.
   command->add_option("--camera", request->open.camera, "Shipped calibration or file")
       ->type_name("NAME|FILE");
   add_topic_option(*command, request->open);
