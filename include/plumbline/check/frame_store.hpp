@@ -31,7 +31,7 @@ struct SmallFrame {
 /// The pixel of the whole picture, `of` wide or high, whose depth the small one, `to` wide or high, has at
 /// `at`.
 inline int grid_pixel(int at, int of, int to) {
-  return static_cast<int>((static_cast<std::int64_t>(2 * at + 1) * of) / (2 * to));
+  return static_cast<int>(((2 * std::int64_t{at} + 1) * of) / (2 * std::int64_t{to}));
 }
 
 /// `camera`: of the rectified frame.
