@@ -164,7 +164,7 @@ class CheckStage : public Stage {
     return {};
   }
 
-  bool enabled_ = true;
+  bool enabled_ = false;
   const RunContext* context_ = nullptr;
   std::optional<check::FrameStore> store_;
   std::vector<check::FrameChoice> choices_;          ///< by robot

@@ -59,7 +59,7 @@ TEST_F(Checks, PathsOfOtherPrograms) {
 
 TEST_F(Checks, EndOfMap) {
   film();
-  const Outcome mapped = run("map world/robot0 -o out --set output.views=");
+  const Outcome mapped = run("map world/robot0 -o out --set output.views= --set check.enabled=on");
   ASSERT_EQ(mapped.code, 0) << mapped;
   EXPECT_EQ(mapped.out.rfind("Shape ± ", 0), 0U) << mapped;
   const auto in_map = read_json(path("out/summary.json"))["check"];
@@ -77,12 +77,11 @@ TEST_F(Checks, EndOfMap) {
     pose.world_from_camera = pose.world_from_camera.inverse();
   });
   const Outcome given =
-      run("map world/robot0 -o given -p known_poses --set poses.file=mirrored.txt --set output.views=");
+      run("map world/robot0 -o given -p known_poses --set poses.file=mirrored.txt --set output.views= "
+          "--set check.enabled=on");
   EXPECT_EQ(given.code, 4) << given;
   EXPECT_EQ(given.out.rfind("Not trustworthy: ", 0), 0U) << given;
-  const Outcome off =
-      run("map world/robot0 -o off -p known_poses --set poses.file=mirrored.txt --set output.views= "
-          "--set check.enabled=off");
+  const Outcome off = run("map world/robot0 -o off -p fast --set output.views=");
   EXPECT_EQ(off.code, 0) << off;
   EXPECT_FALSE(read_json(path("off/summary.json")).contains("check"));
 }
