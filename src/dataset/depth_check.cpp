@@ -19,9 +19,8 @@ constexpr std::size_t kDepthSamples = 5;
 constexpr double kSensorReach_m = 10.0;
 constexpr double kMaxShareBeyondReach = 0.1;
 constexpr double kMaxShareTooNear = 0.05;
-constexpr double kLeastMedian_m = 0.2;
-constexpr double kMostMedian_m = 20.0;
-constexpr double kFarMedian_m = 7.0;  // no room is seen from so far; a sign, no error
+constexpr double kLeastMedian_m = 0.07;
+constexpr double kMostMedian_m = 40.0;
 // Steps of 1 / z, 1/m: an eighth of a pixel of a Kinect is 0.0029, a thirty-second of a RealSense's 0.0008.
 constexpr double kFinestStep = 0.0005;
 constexpr double kCoarsestStep = 0.007;
@@ -89,7 +88,6 @@ core::Result<ScaleCheck> check_depth_scale(const FrameSource& source, const std:
   std::string signs;
   int count = 0;
   const auto add = [&](const std::string& sign) { signs += (count++ > 0 ? ", " : "") + sign; };
-  if (median > kFarMedian_m) add("rooms are nearer");
   if (const double beyond = depth->share_beyond(kSensorReach_m); beyond > kMaxShareBeyondReach)
     add(fmt::format("{:.0f} % of the depth is beyond the {} m that depth cameras reach", 100.0 * beyond,
                     kSensorReach_m));
