@@ -1,17 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/check/frame_store.hpp"
 
-#include <fmt/format.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <cstdlib>
-#include <cstring>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <utility>
-
-#include "plumbline/core/packing.hpp"
 
 namespace plumbline::check {
 namespace {
@@ -53,12 +46,6 @@ void set_pixels(const core::Bytes& bytes, SmallFrame& frame) {
       depth[x] = left_depth = static_cast<std::uint16_t>(left_depth + step);
     }
   }
-}
-
-tl::unexpected<core::Error> file_failed(const char* what) {
-  return core::failure(
-      core::ErrorKind::kOutput,
-      fmt::format("the temporary file of the check cannot be {}: {}", what, std::strerror(errno)));
 }
 
 }  // namespace
@@ -103,51 +90,23 @@ FrameChoice::Use FrameChoice::next(double stamp) {
   return Use::kAnchor;
 }
 
-core::Result<FrameStore> FrameStore::make(const std::filesystem::path& folder) {
-  std::string name = (folder / "check.XXXXXX").string();
-  const int file = ::mkstemp(name.data());
-  if (file < 0) return file_failed("made");
-  ::unlink(name.c_str());
-  return FrameStore(file);
-}
-
-FrameStore::FrameStore(FrameStore&& other) noexcept
-    : file_(std::exchange(other.file_, -1)), places_(std::move(other.places_)) {}
-
-FrameStore::~FrameStore() {
-  if (file_ >= 0) ::close(file_);
-}
-
-core::Result<std::size_t> FrameStore::add(const SmallFrame& frame) {
-  const core::Bytes packed = core::pack(bytes_of(frame));
-  Place place{places_.empty() ? 0 : places_.back().offset + places_.back().bytes,
-              static_cast<std::uint32_t>(packed.size()), frame.stamp, frame.depth_stamp, frame.gray.size()};
-  for (std::size_t done = 0; done < packed.size();) {
-    const ssize_t wrote =
-        ::pwrite(file_, packed.data() + done, packed.size() - done, static_cast<off_t>(place.offset + done));
-    if (wrote <= 0) return file_failed("written");
-    done += static_cast<std::size_t>(wrote);
-  }
-  places_.push_back(place);
-  return places_.size() - 1;
+std::size_t FrameStore::add(const SmallFrame& frame) {
+  headers_.push_back({frame.stamp, frame.depth_stamp, frame.gray.size()});
+  return blocks_.add(bytes_of(frame));
 }
 
 core::Result<SmallFrame> FrameStore::read(std::size_t number) const {
-  const Place& place = places_.at(number);
-  core::Bytes packed(place.bytes);
-  for (std::size_t done = 0; done < packed.size();) {
-    const ssize_t got =
-        ::pread(file_, packed.data() + done, packed.size() - done, static_cast<off_t>(place.offset + done));
-    if (got <= 0) return file_failed("read");
-    done += static_cast<std::size_t>(got);
-  }
+  const std::optional<core::Bytes> bytes = blocks_.get(number);
+  if (!bytes)
+    return core::failure(core::ErrorKind::kOutput, "the temporary file of the check cannot be read");
 
+  const Header& header = headers_.at(number);
   SmallFrame frame;
-  frame.stamp = place.stamp;
-  frame.depth_stamp = place.depth_stamp;
-  frame.gray.create(place.size, CV_8UC1);
-  frame.depth.create(place.size, CV_16UC1);
-  set_pixels(core::unpack(packed.data(), packed.size()), frame);
+  frame.stamp = header.stamp;
+  frame.depth_stamp = header.depth_stamp;
+  frame.gray.create(header.size, CV_8UC1);
+  frame.depth.create(header.size, CV_16UC1);
+  set_pixels(*bytes, frame);
   return frame;
 }
 

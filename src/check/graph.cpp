@@ -45,6 +45,8 @@ class Equations {
       : anchors_(anchors), links_(links) {
     for (const GraphAnchor& anchor : anchors) middle_ += anchor.world_from_camera.translation;
     middle_ /= static_cast<double>(anchors.size());
+
+    // No correction is better than the best ones are.
     for (const PairLink& link : links) {
       const Matrix6d own = (link.correction.information + Matrix6d::Identity() * 1e-3).inverse();
       trust_.push_back(

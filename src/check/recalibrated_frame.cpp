@@ -60,6 +60,7 @@ SmallFrame RecalibratedFrame::operator()(const SmallFrame& frame) const {
       if (from[0] < 0) continue;
       const int units = frame.depth.at<std::uint16_t>(from[1], from[0]);
       if (units == 0) continue;
+
       const double inverse = kDepthUnits_per_m / units + static_cast<double>(slope_.at<float>(y, x));
       const double now = inverse > 0.0 ? kDepthUnits_per_m / inverse : 0.0;
       if (now < 65535.0) changed.depth.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(now + 0.5);

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/dataset/live_frames.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -19,7 +17,7 @@
 
 #include "convert/copy_target.hpp"
 #include "frame_images.hpp"
-#include "plumbline/core/packing.hpp"
+#include "plumbline/core/packed_blocks.hpp"
 #include "plumbline/sensor/rectify.hpp"
 
 namespace plumbline::dataset {
@@ -30,19 +28,10 @@ struct LiveImages {
   cv::Mat depth;  ///< CV_16UC1
 };
 
-/// Packed images in a file that vanishes with the process; in memory where there is no such file.
+/// Images by frame, packed.
 class PackedLiveImages {
  public:
-  PackedLiveImages() = default;
-  ~PackedLiveImages() {
-    if (file_ >= 0) ::close(file_);
-  }
-  PackedLiveImages(const PackedLiveImages&) = delete;
-  PackedLiveImages& operator=(const PackedLiveImages&) = delete;
-
-  void open(const std::filesystem::path& folder) {
-    if (file_ < 0) file_ = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
-  }
+  void open(const std::filesystem::path& folder) { blocks_.open(folder); }
 
   void put(std::size_t index, const LiveImages& images) {
     if (has(index)) return;
@@ -51,72 +40,30 @@ class PackedLiveImages {
       const cv::Mat whole = image.isContinuous() ? image : image.clone();
       bytes.insert(bytes.end(), whole.data, whole.data + whole.total() * whole.elemSize());
     }
-
-    Place place{end_, core::pack(bytes)};
-    bytes_ += place.size;
-    if (file_ >= 0 && write_all(place)) {
-      end_ += static_cast<off_t>(place.size);
-      place.bytes = {};
-    }
-    places_[index] = std::move(place);
+    numbers_[index] = blocks_.add(bytes);
   }
 
-  [[nodiscard]] bool has(std::size_t index) const { return places_.count(index) != 0; }
-  [[nodiscard]] std::size_t frames() const { return places_.size(); }
-  [[nodiscard]] std::size_t bytes() const { return bytes_; }
+  [[nodiscard]] bool has(std::size_t index) const { return numbers_.count(index) != 0; }
+  [[nodiscard]] std::size_t frames() const { return numbers_.size(); }
+  [[nodiscard]] std::size_t bytes() const { return blocks_.bytes(); }
 
   [[nodiscard]] std::optional<LiveImages> get(std::size_t index, const cv::Size& color,
                                               const cv::Size& depth) const {
-    const auto found = places_.find(index);
-    if (found == places_.end()) return std::nullopt;
-    const Place& place = found->second;
-    core::Bytes packed = place.bytes;
-    if (packed.empty()) {
-      packed.resize(place.size);
-      if (!read_all(place, packed)) return std::nullopt;
-    }
+    const auto found = numbers_.find(index);
+    if (found == numbers_.end()) return std::nullopt;
+    const std::optional<core::Bytes> bytes = blocks_.get(found->second);
+    if (!bytes) return std::nullopt;
 
-    const core::Bytes bytes = core::unpack(packed.data(), packed.size());
     LiveImages images{cv::Mat(color, CV_8UC3), cv::Mat(depth, CV_16UC1)};
     const std::size_t size = images.color.total() * images.color.elemSize();
-    std::copy_n(bytes.begin(), size, images.color.data);
-    std::copy(bytes.begin() + static_cast<std::ptrdiff_t>(size), bytes.end(), images.depth.data);
+    std::copy_n(bytes->begin(), size, images.color.data);
+    std::copy(bytes->begin() + static_cast<std::ptrdiff_t>(size), bytes->end(), images.depth.data);
     return images;
   }
 
  private:
-  struct Place {
-    Place() = default;
-    Place(off_t at, core::Bytes packed) : offset(at), size(packed.size()), bytes(std::move(packed)) {}
-    off_t offset = 0;
-    std::size_t size = 0;
-    core::Bytes bytes;  ///< empty: in the file
-  };
-
-  [[nodiscard]] bool write_all(const Place& place) const {
-    for (std::size_t done = 0; done < place.size;) {
-      const ssize_t n = ::pwrite(file_, place.bytes.data() + done, place.size - done,
-                                 place.offset + static_cast<off_t>(done));
-      if (n <= 0) return false;  // a full disk: it stays in memory
-      done += static_cast<std::size_t>(n);
-    }
-    return true;
-  }
-
-  [[nodiscard]] bool read_all(const Place& place, core::Bytes& packed) const {
-    for (std::size_t done = 0; done < packed.size();) {
-      const ssize_t n =
-          ::pread(file_, packed.data() + done, packed.size() - done, place.offset + static_cast<off_t>(done));
-      if (n <= 0) return false;
-      done += static_cast<std::size_t>(n);
-    }
-    return true;
-  }
-
-  int file_ = -1;
-  off_t end_ = 0;
-  std::size_t bytes_ = 0;  ///< packed, in the file or in memory
-  std::map<std::size_t, Place> places_;
+  core::PackedBlocks blocks_;
+  std::map<std::size_t, std::size_t> numbers_;  ///< of the blocks, by frame
 };
 
 namespace {

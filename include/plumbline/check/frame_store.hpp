@@ -2,12 +2,14 @@
 #pragma once
 
 // Small pictures of some frames of a path, kept in a temporary file until the path is final.
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
 #include "plumbline/core/error.hpp"
+#include "plumbline/core/packed_blocks.hpp"
 #include "plumbline/sensor/camera.hpp"
 #include "plumbline/sensor/frame.hpp"
 
@@ -52,35 +54,27 @@ class FrameChoice {
   bool wants_next_ = false;
 };
 
-/// Frames packed by zstd (less than 200 kB each) in a file that vanishes with the process. read() is
-/// thread-safe, beside add(), too.
+/// Frames, packed (less than 200 kB each) as core::PackedBlocks keeps them. read() may be called by several
+/// threads at once, not beside add().
 class FrameStore {
  public:
-  /// A file without a name in `folder`. Error (kOutput): it cannot be made.
-  static core::Result<FrameStore> make(const std::filesystem::path& folder);
-  FrameStore(FrameStore&& other) noexcept;
-  FrameStore& operator=(FrameStore&&) = delete;
-  FrameStore(const FrameStore&) = delete;
-  FrameStore& operator=(const FrameStore&) = delete;
-  ~FrameStore();
+  /// `folder`: where its file without a name is made.
+  explicit FrameStore(const std::filesystem::path& folder) { blocks_.open(folder); }
 
-  /// Returns the frame's number: 0, 1, 2 ... Error (kOutput): the disk is full.
-  core::Result<std::size_t> add(const SmallFrame& frame);
+  /// Returns the frame's number: 0, 1, 2 ...
+  std::size_t add(const SmallFrame& frame);
   /// Error (kOutput): it cannot be read back.
   [[nodiscard]] core::Result<SmallFrame> read(std::size_t number) const;
-  [[nodiscard]] std::size_t size() const { return places_.size(); }
+  [[nodiscard]] std::size_t size() const { return headers_.size(); }
 
  private:
-  struct Place {
-    std::uint64_t offset = 0;
-    std::uint32_t bytes = 0;
+  struct Header {
     double stamp = 0.0;
     double depth_stamp = 0.0;
     cv::Size size;
   };
-  explicit FrameStore(int file) : file_(file) {}
-  int file_ = -1;
-  std::vector<Place> places_;
+  core::PackedBlocks blocks_;
+  std::vector<Header> headers_;
 };
 
 }  // namespace plumbline::check

@@ -78,8 +78,8 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_for_check(const CheckRe
 }
 
 /// Small pictures of the frames that the check needs, and which these are.
-core::Result<check::FrameStore> keep_frames(const dataset::FrameSource& source, const CheckRequest& request,
-                                            Session& session, check::CheckInput& input) {
+check::FrameStore keep_frames(const dataset::FrameSource& source, const CheckRequest& request,
+                              Session& session, check::CheckInput& input) {
   struct Wanted {
     std::size_t index;
     check::FrameChoice::Use use;
@@ -96,8 +96,7 @@ core::Result<check::FrameStore> keep_frames(const dataset::FrameSource& source, 
   }
 
   // A few are decoded side by side, and shrunk at once.
-  auto store = check::FrameStore::make(fs::temp_directory_path());
-  if (!store) return store;
+  check::FrameStore store(fs::temp_directory_path());
   constexpr std::size_t kChunk = 16;  // frames in memory
   for (std::size_t begin = 0; begin < wanted.size(); begin += kChunk) {
     std::vector<std::optional<check::SmallFrame>> chunk(std::min(kChunk, wanted.size() - begin));
@@ -108,9 +107,8 @@ core::Result<check::FrameStore> keep_frames(const dataset::FrameSource& source, 
 
     for (std::size_t k = 0; k < chunk.size(); ++k) {
       if (!chunk[k]) continue;  // the others will do
-      const auto number = store->add(*chunk[k]);
-      if (!number) return tl::unexpected<core::Error>(number.error());
-      input.frames.push_back({*number, 0, chunk[k]->stamp, chunk[k]->depth_stamp, wanted[begin + k].use});
+      input.frames.push_back(
+          {store.add(*chunk[k]), 0, chunk[k]->stamp, chunk[k]->depth_stamp, wanted[begin + k].use});
     }
 
     session.console().progress(begin + chunk.size(), wanted.size(), "frames");
@@ -132,8 +130,7 @@ core::Result<check::CheckReport> check_recording(const CheckRequest& request, Se
   input.max_dt_s = request.max_dt_s;
   input.told_m = told_by(request.path);
 
-  const auto store = keep_frames(**source, request, session, input);
-  if (!store) return tl::unexpected<core::Error>(store.error());
+  const check::FrameStore store = keep_frames(**source, request, session, input);
   if (input.frames.empty()) {
     return core::input_error(
         fmt::format("{}: no pose within {:g} s of a frame of {}; do the stamps belong together? A larger "
@@ -141,7 +138,7 @@ core::Result<check::CheckReport> check_recording(const CheckRequest& request, Se
                     request.path.string(), request.max_dt_s, request.recording));
   }
 
-  input.read = [&store](std::size_t number) { return store->read(number); };
+  input.read = [&store](std::size_t number) { return store.read(number); };
   return check::check_path(input, session.executor());
 }
 

@@ -79,6 +79,8 @@ void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& 
   command.add_option("--camera", request.open.camera, "Shipped calibration or file")->type_name("NAME|FILE");
   command.add_option("--format", request.open.format, "Layout of INPUT (default: auto)")
       ->check(CLI::IsMember(dataset::layout_names()));
+
+  // The part of the recording.
   add_topic_option(command, request.open);
   add_time_range(command, request.open);
   command.add_option("--every", request.open.every, "Use every N-th frame")

@@ -78,6 +78,7 @@ void add_view(CLI::App& app, Session& session) {
       ->add_option("--http-token", state->token,
                    "Token that every browser must present; it is part of the address that is printed")
       ->type_name("TEXT");
+
   command
       ->add_option("--points", state->request.options.points,
                    "Largest number of points, thinned by voxels; 0: all (default: 1500000)")

@@ -18,10 +18,11 @@ struct Reach {
   double near_m;
   double turned_rad;
 };
-constexpr Reach kMust{0.7, 0.45};          // they do
+constexpr Reach kMust{0.7, 0.45};  // they do
+constexpr Reach kMay{1.5, 0.7};    // most do, unless something stands between them
+
 constexpr double kConfirmed = 0.75;        // of the keyframes that see one place
 constexpr double kConfirmedByLike = 0.45;  // of those that see one that looks alike in part
-constexpr Reach kMay{1.5, 0.7};            // most do, unless something stands between them
 
 /// The keyframe of a whose view should be most like that of a camera of b; invalid: none is.
 KeyframeId nearest_view(const maps::Map& a, const Rigid3& a_from_b, const Rigid3& b_from_camera,

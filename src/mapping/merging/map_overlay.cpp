@@ -183,6 +183,8 @@ std::map<std::uint64_t, SurfaceCell> overlay_surfaces(const MapPart& moved, cons
       const Eigen::Vector3d normal = fixed_from_camera.rotation * samples[next].normal.cast<double>();
       bool there = false;
       bool through = false;
+
+      // Each view that the surface faces.
       for (const PlacedView& view : views) {
         const Eigen::Vector3d in_camera = view.camera_from_world * at;
         if (in_camera.z() < kNear_m || in_camera.z() > kFar_m) continue;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Compares the keyframes' small pictures of two aligned maps: does one place look the
-// same in both? (docs/method/merging.md)
+// Compares the keyframes' small pictures of two aligned maps: does one place look the same in both?
+// (docs/method/merging.md)
 #include <array>
 #include <vector>
 

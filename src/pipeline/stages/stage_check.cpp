@@ -78,18 +78,18 @@ class CheckStage : public Stage {
   core::Result<void> start(const RunContext& context) override {
     context_ = &context;
     if (!enabled_) return {};
-    auto store = check::FrameStore::make(context.output_folder);
-    if (!store) return tl::unexpected(store.error());
-    store_.emplace(std::move(*store));
+    store_.emplace(context.output_folder);
     kept_.resize(recordings().robots().size());
     choices_.resize(kept_.size());
-    return context.resumed != nullptr ? read_again(*context.resumed) : core::Result<void>();
+    if (context.resumed != nullptr) read_again(*context.resumed);
+    return {};
   }
 
   core::Result<void> process(StageIo& io) override {
     const auto track = io.input<TrackedFrame>("track");
     if (!enabled_ || !track->frame.valid()) return {};
-    return keep(*io.input<sensor::RgbdFrame>("frame"), track->robot);
+    keep(*io.input<sensor::RgbdFrame>("frame"), track->robot);
+    return {};
   }
 
   core::Result<void> finish(StageIo& io) override {
@@ -143,25 +143,21 @@ class CheckStage : public Stage {
  private:
   [[nodiscard]] const RobotRecordings& recordings() const { return *context_->input.recordings; }
 
-  core::Result<void> keep(const sensor::RgbdFrame& frame, std::int32_t robot) {
+  void keep(const sensor::RgbdFrame& frame, std::int32_t robot) {
     const auto number = static_cast<std::size_t>(robot);
     const check::FrameChoice::Use use = choices_[number].next(frame.stamp);
-    if (use == check::FrameChoice::Use::kNone) return {};
-    const auto stored = store_->add(check::shrink(frame, recordings().robot(robot).camera.color));
-    if (!stored) return tl::unexpected(stored.error());
-    kept_[number].push_back({*stored, number, frame.stamp, frame.depth_stamp, use});
-    return {};
+    if (use == check::FrameChoice::Use::kNone) return;
+    const std::size_t stored = store_->add(check::shrink(frame, recordings().robot(robot).camera.color));
+    kept_[number].push_back({stored, number, frame.stamp, frame.depth_stamp, use});
   }
 
   /// Reads the frames again that the continued run had kept: its temporary file is gone.
-  core::Result<void> read_again(const ResumedRun& run) {
+  void read_again(const ResumedRun& run) {
     for (const FrameRow& row : run.rows) {
       if (row.state != "tracked") continue;
       const auto frame = recordings().read(row.frame);
-      if (!frame) continue;
-      if (auto kept = keep(*frame, recordings().robot_of(row.frame)); !kept) return kept;
+      if (frame) keep(*frame, recordings().robot_of(row.frame));
     }
-    return {};
   }
 
   bool enabled_ = false;

@@ -249,6 +249,7 @@ class OutputStage : public Stage {
       out.write(fmt::format("{},{},{:.6f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},",
                             core::csv_field(names[keyframe.id.robot]), keyframe.id.index, keyframe.stamp,
                             t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()));
+
       const std::vector<mapping::KeyframeAccuracy>& all = map.accuracy.keyframes;
       const auto* known = all.empty() ? nullptr : &all[i];
       out.write(known ? fmt::format("{},{},{},{},{}\n", sigma_cell(known->sigma_position_m(), 6),

@@ -7,11 +7,11 @@
 #include <optional>
 #include <utility>
 
+#include "options/convention_option.hpp"
 #include "plumbline/core/csv.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/diagnose/signs.hpp"
-#include "plumbline/geometry/pose_convention.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "stages/stages.hpp"
 #include "summary/sections.hpp"
@@ -27,13 +27,7 @@ class PosesStage : public Stage {
                "Poses in TUM format (stamp tx ty tz qx qy qz qw); {robot} in the name stands for each "
                "robot's name; empty: the recordings' own truth",
                core::EmptyValue::kAllowed);
-    table.choice<geometry::PoseConvention>("are", are_,
-                                           {{"world_from_camera", geometry::PoseConvention::kWorldFromCamera},
-                                            {"inverted", geometry::PoseConvention::kInverted},
-                                            {"opengl", geometry::PoseConvention::kOpenGl},
-                                            {"wxyz", geometry::PoseConvention::kWFirst}},
-                                           "Convention of the poses: inverted (camera from world), opengl (y "
-                                           "up, z backwards), wxyz (quaternions begin with w)");
+    declare_convention(table, "are", are_, "the poses");
     table.number("max_gap", max_gap_s_, {0.0, 10.0}, "s",
                  "Poses are interpolated; frames further than this from the nearest pose have none");
     table.number("keyframe_distance", keyframe_distance_m_, {0.0, 10.0}, "m", "Distance between keyframes");

@@ -5,9 +5,9 @@
 #include <atomic>
 #include <utility>
 
+#include "options/convention_option.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/diagnose/signs.hpp"
-#include "plumbline/geometry/pose_convention.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "results/resumed_run.hpp"
 #include "stages/stages.hpp"
@@ -32,14 +32,7 @@ Json live_section(const dataset::LiveReport& live) {
 class ReadStage : public Stage {
  public:
   void declare(core::OptionTable& table) override {
-    table.choice<geometry::PoseConvention>("poses_are", poses_are_,
-                                           {{"world_from_camera", geometry::PoseConvention::kWorldFromCamera},
-                                            {"inverted", geometry::PoseConvention::kInverted},
-                                            {"opengl", geometry::PoseConvention::kOpenGl},
-                                            {"wxyz", geometry::PoseConvention::kWFirst}},
-                                           "Convention of the recorder's own odometry: inverted (camera from "
-                                           "world), opengl (y up, z backwards), wxyz "
-                                           "(quaternions begin with w)");
+    declare_convention(table, "poses_are", poses_are_, "the recorder's own odometry");
   }
   core::Result<void> start(const RunContext& context) override {
     source_ = context.input.source;
