@@ -64,6 +64,7 @@ SmallFrame shrink(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera)
 
   small.depth.create(size, CV_16UC1);
   std::vector<int> columns;
+  columns.reserve(static_cast<std::size_t>(size.width));
   for (int x = 0; x < size.width; ++x) columns.push_back(grid_pixel(x, camera.width, size.width));
 
   for (int y = 0; y < size.height; ++y) {

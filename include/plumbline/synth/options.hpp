@@ -27,6 +27,7 @@ struct SynthOptions {
   Route path = Route::kScene;  ///< through a world made from a number
   std::string changes;         ///< a seed or a file of edits: the same world another day; "": as it is
   bool hall = false;           ///< one room of an office or building is 20 m long
+  bool lift = false;           ///< of a building, in place of its stairs
   int moving_doors = 0;        ///< at most so many doors of a world made from a number swing meanwhile
   int moving_drawers = 0;      ///< at most so many drawers of desks slide out and back meanwhile
   int walkers = 0;             ///< number of the scene's walkers to film; they are not in reference.ply

@@ -102,18 +102,23 @@ struct DoorLeaf {
   double open_rad = 0.0;
 };
 
-/// A leaf that swings to another angle and back at times; or a drawer of a desk that slides out and back.
+/// A leaf that swings to another angle and back at times; or a drawer of a desk that slides out and back; or
+/// a lift's cab or a leaf of its doors.
 struct MovingDoor {
   std::size_t leaf = 0;                             ///< index into Scene::leaves
   int opening = 0;                                  ///< index into Plan::openings
-  std::string drawer;                               ///< its name; empty: a door
+  std::string drawer;                               ///< its name, or that of a part of a lift; empty: a door
   Eigen::Vector3d slide = Eigen::Vector3d::Zero();  ///< m, of a drawer, whose "angles" are shares of it
+  double lit = 1.0;                                 ///< share of `slide` at which its light is computed
   std::vector<Face> body;                           ///< of a drawer, behind its front; where it is pulled out
   double rest_rad = 0.0;                            ///< how far it is open else
   double other_rad = 0.0;                           ///< where it swings to
   double swing = 1.5;                               ///< s that it takes to swing there, and back
   double hold = 3.0;                                ///< s that it stays there
   std::vector<double> starts;  ///< s after the first frame, rising; of the first round if there are several
+  std::vector<double> shares;  ///< of a part of a lift: of `slide`, kShareStep apart from the first frame on
+
+  static constexpr double kShareStep = 0.02;  ///< s
 
   /// Angle from shut, t seconds after the first frame.
   [[nodiscard]] double angle(double t) const;

@@ -18,7 +18,6 @@ constexpr double kGoing = 0.27;    // m from step to step
 constexpr double kRise = 0.18;     // m, the largest height of a step
 constexpr double kEntry = 1.3;     // m of floor before the stairs, on every storey
 constexpr double kLanding = 1.25;  // m, the least depth of the landing halfway
-constexpr double kSlab = 0.3;      // m of concrete between storeys
 
 int steps_of(double pitch) { return static_cast<int>(std::ceil(0.5 * pitch / kRise)); }
 
@@ -37,6 +36,8 @@ struct Stairwell {
   [[nodiscard]] double top() const { return y1 - kEntry; }  // where the flights begin and end
   [[nodiscard]] double bottom() const { return top() - steps_of(pitch) * kGoing; }
   [[nodiscard]] Vector2d entry() const { return {middle(), y1 - 0.5 * kEntry}; }
+
+  [[nodiscard]] LiftShaft shaft() const { return {{Vector2d(x0, y0), Vector2d(x1, y1)}, top()}; }
 
   /// The way from the entry up to that of the next storey; z above this floor.
   [[nodiscard]] std::vector<Vector3d> climb() const {
@@ -200,7 +201,7 @@ Plan storey_of(const Plan& plan, int storey) {
 
 const PlanRoom* stairs_of(const Plan& plan) {
   const auto room = std::find_if(plan.rooms.begin(), plan.rooms.end(),
-                                 [](const PlanRoom& r) { return r.kind == "stairs"; });
+                                 [](const PlanRoom& r) { return r.kind == "stairs" || r.kind == "lift"; });
   return room == plan.rooms.end() ? nullptr : &*room;
 }
 
@@ -223,6 +224,7 @@ bool build_building(const SynthOptions& options, std::uint64_t seed, Scene& scen
     const int alike = std::max(options.like, options.copies);
     if (!add_rooms(draw_storey(frame, options.rooms, alike, options.hall && storey == 0, cells), rooms, part))
       return false;
+
     const bool lowest = storey == 0, highest = storey + 1 == options.floors;
     for (PlanRoom& room : part.rooms) {
       room.height = std::min(room.height, frame.height);
@@ -239,9 +241,15 @@ bool build_building(const SynthOptions& options, std::uint64_t seed, Scene& scen
     build_shell(part, shell, builder);
     const Stairwell well(*stairs, frame.pitch);
     const int index = static_cast<int>(stairs - part.rooms.data());
-    build_stairs(well, index, lowest, highest, frame.height, builder);
+
+    if (options.lift) {
+      build_lift_storey(well.shaft(), index, lowest, highest, highest ? frame.height : frame.pitch, builder);
+    } else {
+      build_stairs(well, index, lowest, highest, frame.height, builder);
+    }
+
     part.things.push_back(
-        {"stairs", "stairs",
+        {options.lift ? "lift" : "stairs", options.lift ? "lift" : "stairs",
          rectangle({0.0, 0.0}, 0.0, {well.x0 + 0.01, well.y0 + 0.01}, {well.x1 - 0.01, well.top()}), 0.0,
          frame.pitch, index});
 
@@ -256,6 +264,12 @@ bool build_building(const SynthOptions& options, std::uint64_t seed, Scene& scen
     append(part, floor, plan);
   }
 
+  if (options.lift) {
+    for (PlanRoom& room : plan.rooms) {
+      if (room.kind == "stairs") room.kind = "lift";
+    }
+    add_lift(Stairwell(*stairs_of(plan), frame.pitch).shaft(), plan.storeys, scene);
+  }
   return true;
 }
 
@@ -288,7 +302,23 @@ RobotPath plan_building_path(const Plan& plan, Route route, int robot, Rng& rng)
     }
   };
 
+  const bool lift = stairs_of(plan)->kind == "lift";
+  const auto ride = [&](int from, int to) {
+    const auto z = [&](int storey) { return plan.storeys[static_cast<std::size_t>(storey)] + height; };
+    for (const Vector3d& p : lift_ride(well->shaft(), z(from), z(to))) {
+      Waypoint w;
+      w.position = p;
+      if (p.y() < well->top() - 0.5) w.look = Vector3d(p.x(), well->top() + 2.0, p.z() - 0.4);
+      path.waypoints.push_back(w);
+    }
+  };
+
   const auto climb = [&](int from, int to) {
+    if (lift) {
+      if (from != to) ride(from, to);
+      return;
+    }
+
     for (int k = from; k != to; k += to > from ? 1 : -1) {
       std::vector<Vector3d> steps = well->climb();
       const double floor = plan.storeys[static_cast<std::size_t>(to > from ? k : k - 1)];

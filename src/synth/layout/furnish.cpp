@@ -149,12 +149,15 @@ class Furnisher {
         scene.objects.push_back(scene.objects[k]);
         scene.objects.back().name = name(k);
       }
+
       for (std::size_t k = faces; k < ends[1]; ++k) {
         Face face = scene.faces[k];
         const auto object = static_cast<std::size_t>(face.object);
         const std::string& type = scene.objects[object].type;
+
         face.origin += shift;
         face.object = static_cast<int>(base + object - objects);
+
         if (!plan_.copies &&
             (type == "poster" || type == "picture" || type == "sign" || type == "whiteboard"))
           face.seed = face.object + 1;
@@ -165,6 +168,7 @@ class Furnisher {
         scene.lamps.push_back(scene.lamps[k]);
         scene.lamps.back().center += shift;
       }
+
       for (std::size_t k = things; k < ends[3]; ++k) {
         PlanThing thing = plan_.things[k];
         for (Vector2d& p : thing.outline) p += way;
@@ -172,6 +176,7 @@ class Furnisher {
         for (std::size_t j = objects; j < ends[0]; ++j) {
           if (scene.objects[j].name == thing.name) thing.name = name(j);
         }
+
         ground_.block(thing.outline, thing.top > 1.4);
         plan_.things.push_back(std::move(thing));
       }

@@ -89,13 +89,19 @@ core::Result<Scene> make_layout(const std::string& kind, const SynthOptions& opt
     return core::usage_error(
         fmt::format("like, copies: a {} has no rooms alike; office and building have", kind));
   }
+
   if (options.hall && (kind == "home" || kind == "corridor" || std::max(options.like, options.copies) > 1)) {
     return core::usage_error(
         "hall: an office or a building has one, where no rooms are alike; leave out hall, or like and "
         "copies");
   }
-  constexpr int kAttempts = 200;
+  if (options.lift && (kind != "building" || options.floors < 2 || options.robots > 1)) {
+    return core::usage_error(
+        "lift: a building of two storeys or more has one, in which one robot rides; leave out lift, or give "
+        "`building`, floors and robots=1");
+  }
 
+  constexpr int kAttempts = 200;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     auto scene = try_layout(kind, options, attempt, false);
     if (!scene) return tl::unexpected<core::Error>(scene.error());

@@ -10,9 +10,13 @@
 
 namespace plumbline::synth {
 
+class CameraPath;
+
 /// Cells of a home, an office or a ring of corridors; cells of the kind "outside" are no rooms. `alike`:
 /// rooms of an office that have the same shape; `hall`: one of its rooms is 20 m long.
 Subdivision draw_cells(const std::string& kind, int alike, bool hall, Rng& rng);
+
+constexpr double kSlab = 0.3;  ///< m of concrete between storeys
 
 /// The storeys of a building have the corridor and the stairs in common.
 struct BuildingFrame {
@@ -29,6 +33,28 @@ Subdivision draw_storey(const BuildingFrame& frame, int rooms, int alike, bool h
 
 /// A building of several storeys with stairs; nothing if it did not come out.
 bool build_building(const SynthOptions& options, std::uint64_t seed, Scene& scene, Plan& plan);
+
+/// The shaft of a lift and the lobbies before it, which are open to the corridor at the largest y.
+struct LiftShaft {
+  Eigen::AlignedBox2d box;  ///< m, inner faces of both
+  double door = 0.0;        ///< m: y of the wall between them, on the lobbies' side
+
+  [[nodiscard]] double middle() const { return box.center().x(); }
+  [[nodiscard]] double back() const;  ///< y of the cab's back
+};
+
+/// Lobby of one storey, whose floor is at 0, up to the next one's floor or the highest ceiling.
+void build_lift_storey(const LiftShaft& shaft, int index, bool lowest, bool highest, double height,
+                       Builder& b);
+
+/// The cab and its doors, which move (Scene::moving_doors).
+void add_lift(const LiftShaft& shaft, const std::vector<double>& storeys, Scene& scene);
+
+/// The way from a lobby into the cab, and out on another storey, with the heights of both.
+std::vector<Eigen::Vector3d> lift_ride(const LiftShaft& shaft, double from, double to);
+
+/// Moves the lift as its rider needs it.
+void run_lift(const SynthOptions& options, const CameraPath& path, Scene& scene);
 
 /// The camera's path over all storeys of a building; empty if it finds none.
 RobotPath plan_building_path(const Plan& plan, Route route, int robot, Rng& rng);

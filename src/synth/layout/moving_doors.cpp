@@ -13,6 +13,12 @@ namespace plumbline::synth {
 using Eigen::Vector2d;
 
 double MovingDoor::angle(double t) const {
+  if (!shares.empty()) {
+    const double at = std::clamp(t / kShareStep, 0.0, static_cast<double>(shares.size() - 1));
+    const auto i = std::min(static_cast<std::size_t>(at), shares.size() - 2);
+    const double s = at - static_cast<double>(i);
+    return (1.0 - s) * shares[i] + s * shares[i + 1];
+  }
   const auto next = std::upper_bound(starts.begin(), starts.end(), t);
   if (next == starts.begin()) return rest_rad;
   const double since = t - *std::prev(next);
@@ -161,6 +167,7 @@ std::vector<MovingDoor> drawers(const std::vector<std::vector<Eigen::Vector3d>>&
     if (type != "desk" || (i > 0 && scene.faces[i - 1].object == object)) continue;
     const auto drawer = static_cast<std::size_t>(rng.integer(0, 2));
     MovingDoor door;
+
     const DoorLeaf front{i + 4 * kBox + 2 * drawer * kBox, 2 * kBox,
                          middle_of(scene, i + (4 + 2 * drawer) * kBox, kBox), 0.0};
     if (scene.faces[front.first + front.count - 1].object != object) continue;
@@ -183,6 +190,7 @@ std::vector<MovingDoor> drawers(const std::vector<std::vector<Eigen::Vector3d>>&
     door.other_rad = 1.0;
     door.slide = -out * in;
     frame.translation += door.slide;
+
     Scene box;
     Builder(box).box(frame, {-0.19, 0.01, -0.08}, {0.19, 0.34, 0.06}, {"cardboard"});
     for (Face& face : box.faces) face.object = object;
@@ -207,6 +215,7 @@ void choose(std::vector<MovingDoor> able, int count, Scene& scene, Rng& rng) {
 }  // namespace
 
 void choose_moving_doors(const SynthOptions& options, Scene& scene) {
+  if (options.lift && scene.plan) run_lift(options, camera_path(scene, options, {}, 0), scene);
   if (options.moving_drawers < 1 && (options.moving_doors < 1 || !scene.plan)) return;
   Rng rng(static_cast<std::uint64_t>(options.seed), 0xd005);
   const auto places = cameras(options, scene);

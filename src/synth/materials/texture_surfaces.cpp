@@ -200,10 +200,12 @@ Canvas draw_cloth(const Material& m, cv::Size size, std::uint64_t seed) {
   }
 
   cv::Mat1f field(size, 0.0F);
+
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       const float u = static_cast<float>(x) / static_cast<float>(size.width) + 0.018F * sway(y, x);
       float sum = 0.0F;
+
       for (const Fold& f : folds) {
         float d = u - f.at;
         d -= std::round(d);

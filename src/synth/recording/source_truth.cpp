@@ -34,11 +34,32 @@ const Rigid3& SynthSource::body_from_camera() const { return impl_->body_from_ca
 double SynthSource::start() const { return kFirstStamp; }
 const std::vector<Event>& SynthSource::events() const { return impl_->events; }
 
+namespace {
+
+/// A row for each time that a part of a lift moves.
+void add_moves(const MovingDoor& part, std::vector<DoorSwing>& out) {
+  const std::vector<double>& shares = part.shares;
+  const auto stamp = [](std::size_t k) {
+    return kFirstStamp + static_cast<double>(k) * MovingDoor::kShareStep;
+  };
+
+  for (std::size_t i = 0; i + 1 < shares.size();) {
+    const std::size_t begin = i++;
+    if (shares[begin + 1] == shares[begin]) continue;
+    while (i + 1 < shares.size() && shares[i + 1] != shares[i]) ++i;
+    out.push_back({part.opening, part.drawer, stamp(begin), stamp(i), shares[i] * part.slide.norm()});
+  }
+}
+
+}  // namespace
+
 std::vector<DoorSwing> SynthSource::swings() const {
   std::vector<DoorSwing> out;
   const double end = impl_->frames.back().color - kFirstStamp;
   const double once = impl_->kept ? impl_->path->duration() : end;
   for (const MovingDoor& door : impl_->world->scene.moving_doors) {
+    add_moves(door, out);
+
     for (int round = 0; round * once < end; ++round) {
       for (const double start : door.starts) {
         for (const bool back : {false, true}) {

@@ -219,21 +219,24 @@ double CameraPath::sway(std::size_t axis, double t) const {
   return sum;
 }
 
-Rigid3 CameraPath::world_from_camera(double t) const {
+CameraPath::Knot CameraPath::spline(double t) const {
   const double u = path_time(t) / step_, floor = std::floor(u), x = u - floor;
   const long i = static_cast<long>(floor);
   const double weights[4] = {(1 - x) * (1 - x) * (1 - x) / 6.0, (3 * x * x * x - 6 * x * x + 4) / 6.0,
                              (-3 * x * x * x + 3 * x * x + 3 * x + 1) / 6.0, x * x * x / 6.0};
 
-  Vector3d position = Vector3d::Zero();
-  double yaw = 0.0, pitch = 0.0;
+  Knot sum{Vector3d::Zero(), 0.0, 0.0, 0};
   for (int k = 0; k < 4; ++k) {
     const Knot at = knot(i - 1 + k);
-    position += weights[k] * at.position;
-    yaw += weights[k] * at.yaw;
-    pitch += weights[k] * at.pitch;
+    sum.position += weights[k] * at.position;
+    sum.yaw += weights[k] * at.yaw;
+    sum.pitch += weights[k] * at.pitch;
   }
+  return sum;
+}
 
+Rigid3 CameraPath::world_from_camera(double t) const {
+  auto [position, yaw, pitch, waypoint] = spline(t);
   for (const Event& e : spins_) yaw += 2.0 * M_PI * e.value * smoother((t - e.start_s) / e.duration_s);
   const double p = pace(t);
   position += p * Vector3d(sway(0, t), sway(1, t), sway(2, t));
@@ -259,8 +262,8 @@ CameraPath camera_path(const Scene& scene, const SynthOptions& options, const st
   motion.speed = options.speed;
   motion.wheeled = (options.motion == Motion::kScene ? scene.motion : options.motion) == Motion::kWheeled;
   motion.seed = mix(static_cast<std::uint64_t>(options.seed), static_cast<std::uint64_t>(driver) + 1);
-  const auto index = static_cast<std::size_t>(driver), paths = scene.robots.size();
-  motion.start_share = 0.381966 * static_cast<double>(index / paths);
+  const auto index = static_cast<std::size_t>(driver), paths = scene.robots.size(), rounds = index / paths;
+  motion.start_share = 0.381966 * static_cast<double>(rounds);
   motion.events = events;
   motion.frame_s = options.repeat > 1 ? 1.0 / options.fps : 0.0;
   return {scene.robots[index % paths], motion};

@@ -30,6 +30,8 @@ class CameraPath {
 
   /// Pose t seconds after the start; the path is repeated, as a round (closed) or back and forth (open).
   [[nodiscard]] geometry::Rigid3 world_from_camera(double t) const;
+  /// The camera's height without sway, m.
+  [[nodiscard]] double height(double t) const { return spline(t).position.z(); }
   /// Seconds of the path once.
   [[nodiscard]] double duration() const { return duration_; }
   /// Index of the waypoint passed last at time t.
@@ -46,6 +48,7 @@ class CameraPath {
     double amplitude, frequency, phase;
   };
   [[nodiscard]] Knot knot(long index) const;  ///< any index: wraps or mirrors
+  [[nodiscard]] Knot spline(double t) const;  ///< without sway and spins
   [[nodiscard]] double path_time(double t) const;
   [[nodiscard]] double pace(double t) const;  ///< 1: moving along the path; 0: standing still for a spin
   [[nodiscard]] double sway(std::size_t axis, double t) const;

@@ -42,7 +42,7 @@ World::World(Scene s, SynthOptions o) : scene(std::move(s)), options(std::move(o
     for (std::size_t k = leaf.first; k < leaf.first + leaf.count; ++k) {
       gone[k] = 1;
       scene.faces.push_back(Face(scene.faces[k]));
-      scene.faces.back().origin += door.slide;
+      scene.faces.back().origin += door.lit * door.slide;
     }
     scene.faces.insert(scene.faces.end(), door.body.begin(), door.body.end());
   }
@@ -119,8 +119,8 @@ geometry::Rigid3 World::motion(const Mover& mover, double t) const {
   const MovingDoor& door = scene.moving_doors[mover.which];
   const DoorLeaf& leaf = scene.leaves[door.leaf];
   geometry::Rigid3 swung;
-  if (!door.drawer.empty()) {  // its faces are where it is pulled out, for the light there
-    swung.translation = (door.angle(t) - 1.0) * door.slide;
+  if (!door.drawer.empty()) {  // its faces are where their light is computed
+    swung.translation = (door.angle(t) - door.lit) * door.slide;
     return swung;
   }
   swung.rotation = Eigen::AngleAxisd(leaf.open_rad - door.angle(t), Vector3d::UnitZ()).toRotationMatrix();

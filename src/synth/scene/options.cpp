@@ -30,6 +30,7 @@ void SynthOptions::declare(core::OptionTable& table) {
       "own posters");
   table.integer("copies", copies, {0, 12}, "", "The same with the same posters");
   table.boolean("hall", hall, "One room of an office, or of a building's lowest storey, is 20 m long");
+  table.boolean("lift", lift, "A building has a lift in place of stairs; one robot rides in it");
 
   table.choice(
       "path", path,
