@@ -105,6 +105,26 @@ class Mapping(Folder):
         self.assertTrue(tracked[0].keyframe)
         np.testing.assert_allclose(tracked[0].pose, np.eye(4), atol=1e-9)
 
+    def test_pictures_that_a_live_run_does_not_keep_are_not_read_from_a_recording_either(self):
+        wrong = self.work / "wrong"
+        program("synth", "room", "-o", wrong, "--frames", 90, "--width", 320, "--height", 240, "--camera-error", "fx=3%", "-q")
+        recording = plumbline.open(wrong / "robot0", raw=True)
+        few, all_of_them = {"track.camera.pictures": 2}, {}
+        kept, maps = [], []
+        for name, options in (("few", few), ("all", all_of_them)):
+            settings = [f"--set={key}={value}" for key, value in options.items()]
+            program("map", wrong / "robot0", "-o", self.work / f"{name}_by_program", "-q", *settings)
+            with plumbline.Mapper(recording.camera, name="robot0", output=self.work / f"{name}_live", **options) as mapper:
+                for f in recording:
+                    mapper.feed(f.color, f.depth, f.stamp, depth_stamp=f.depth_stamp)
+                result = mapper.finish()
+            _, differ, absent = filecmp.cmpfiles(result.folder, self.work / f"{name}_by_program", SAME, shallow=False)
+            self.assertEqual((differ, absent), ([], []))
+            kept.append(result.summary["live"]["kept_frames"])
+            maps.append((result.folder / "map.ply").read_bytes())
+        self.assertLess(kept[0], kept[1])
+        self.assertNotEqual(maps[0], maps[1])
+
     def test_one_after_the_other_gives_the_same(self):
         """Whoever waits for each pose before the next frame, with one thread."""
         recording = plumbline.open(self.recording, raw=True)

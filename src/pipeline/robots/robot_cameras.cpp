@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -25,13 +26,14 @@ constexpr int kMostQuestions = 2;
 
 }  // namespace
 
-RobotCameras::RobotCameras(RobotRecordings& recordings, bool refine, BeginSlam begin,
+RobotCameras::RobotCameras(RobotRecordings& recordings, bool refine, int pictures, BeginSlam begin,
                            const RunContext& context)
     : recordings_(&recordings),
       begin_(std::move(begin)),
       services_(context.services),
       executor_(context.executor),
       log_(context.log),
+      pictures_(pictures),
       choices_(recordings.robots().size()),
       robots_(recordings.robots()) {
   // Generated recordings have no lens, and no error but on request.
@@ -110,10 +112,10 @@ bool RobotCameras::before(std::size_t frame, std::size_t robot, Slams& slams) {
   return true;
 }
 
-bool RobotCameras::may_read_again(std::size_t frame, std::size_t robot, bool keyframe) {
-  const bool taken = choices_[robot].takes(keyframe);
+bool RobotCameras::may_read_again(std::size_t frame, std::size_t robot, core::KeyframeId keyframe) {
+  const bool taken = choices_[robot].takes(keyframe.valid());
   const bool before = !answered_ || question_ != nullptr || frame < use_from_;
-  return refine_ && (keyframe || (taken && before));
+  return refine_ && (keyframe.valid() ? keyframe.index < pictures_ : taken && before);
 }
 
 void RobotCameras::use(std::size_t robot, bool again, std::unique_ptr<mapping::Slam>& slam) {
@@ -122,8 +124,15 @@ void RobotCameras::use(std::size_t robot, bool again, std::unique_ptr<mapping::S
   robots_[robot].versions.push_back({camera, slam->map().next_keyframe_id(number).index,
                                      static_cast<std::int32_t>(slam->frame_poses().size())});
   const std::shared_ptr<const dataset::FrameSource> pictures = recordings_->taken_by(number, camera);
+
+  // What a live source has not kept is not read from a recording either.
+  std::size_t end = std::numeric_limits<std::size_t>::max();
+  for (const core::KeyframeId id : slam->map().keyframe_ids()) {
+    if (id.index >= pictures_)
+      end = std::min(end, static_cast<std::size_t>(slam->map().keyframe(id).frame_index));
+  }
   const auto read = [&](std::size_t index) -> std::optional<sensor::RgbdFrame> {
-    if (pictures == nullptr) return std::nullopt;
+    if (pictures == nullptr || index >= end) return std::nullopt;
     auto frame = pictures->read(index);
     if (!frame) return std::nullopt;
     return std::move(*frame);

@@ -23,10 +23,11 @@ using Slams = std::vector<std::unique_ptr<mapping::Slam>>;  ///< by robot
 
 class RobotCameras {
  public:
-  /// `refine`: estimate the cameras. All arguments must outlive this.
-  /// `begin`: a Slam of that robot that has seen nothing.
+  /// `refine`: estimate the cameras. `pictures`: keyframes of each robot that may be read again. All
+  /// arguments must outlive this. `begin`: a Slam of that robot that has seen nothing.
   using BeginSlam = std::function<std::unique_ptr<mapping::Slam>(const RobotInfo&)>;
-  RobotCameras(RobotRecordings& recordings, bool refine, BeginSlam begin, const RunContext& context);
+  RobotCameras(RobotRecordings& recordings, bool refine, int pictures, BeginSlam begin,
+               const RunContext& context);
 
   /// The robots, with all refined versions of their cameras and what is known of these.
   [[nodiscard]] const std::vector<RobotInfo>& robots() const { return robots_; }
@@ -38,8 +39,9 @@ class RobotCameras {
   bool before(std::size_t frame, std::size_t robot, Slams& slams);
   /// Called after a frame was tracked: starts the estimate from the present maps, beside the tracker, once.
   void after(std::size_t frame, const Slams& slams);
-  /// True if the second pass may need the picture of a frame that was tracked; to be called for each.
-  [[nodiscard]] bool may_read_again(std::size_t frame, std::size_t robot, bool keyframe);
+  /// True if the picture of a frame that was tracked may be read again; to be called for each. `keyframe`:
+  /// what it became, invalid if it became none.
+  [[nodiscard]] bool may_read_again(std::size_t frame, std::size_t robot, core::KeyframeId keyframe);
   /// Estimates from the finished maps, until nothing improves any more.
   void estimate_finished(Slams& slams);
 
@@ -75,6 +77,7 @@ class RobotCameras {
   const core::Executor* executor_;
   core::Log* log_;
   bool refine_;
+  int pictures_;
   bool asked_;                                      ///< while mapping
   bool answered_ = false;                           ///< while mapping: what came before is not read any more
   std::vector<mapping::SecondPassChoice> choices_;  ///< by robot

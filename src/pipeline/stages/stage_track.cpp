@@ -39,6 +39,9 @@ class TrackStage : public Stage {
     table.choice<bool>("camera.refine", refine_, {{"auto", true}, {"off", false}},
                        "Estimate the camera from the map, after 40 keyframes or 10 s and at the end, and "
                        "rebuild the map for it");
+    table.integer("camera.pictures", pictures_, {1, 1'000'000}, "",
+                  "Keyframes of each robot, from the first on, whose pictures are read again for a better "
+                  "camera; a live run keeps no more of them");
   }
   [[nodiscard]] bool draws_frames() const override { return true; }
   [[nodiscard]] bool resumes() const override { return true; }
@@ -53,7 +56,7 @@ class TrackStage : public Stage {
       return slam;
     };
     for (const RobotInfo& robot : recordings().robots()) slams_.push_back(begin(robot));
-    cameras_.emplace(*context.input.recordings, refine_, begin, context);
+    cameras_.emplace(*context.input.recordings, refine_, pictures_, begin, context);
     unstored_.resize(slams_.size());
     observed_.resize(slams_.size());
     if (context.resumed != nullptr) restore(*context.resumed);
@@ -85,8 +88,7 @@ class TrackStage : public Stage {
     tracked->row = rows_.back();
     if (slam.frame_poses().size() > poses) {
       tracked->pose = slam.frame_poses().back();
-      if (cameras_->may_read_again(io.frame(), number, report.keyframe.valid()))
-        recordings().keep(io.frame());
+      if (cameras_->may_read_again(io.frame(), number, report.keyframe)) recordings().keep(io.frame());
     }
 
     if (tracked->pose && tracked->pose->tracked) {
@@ -249,6 +251,7 @@ class TrackStage : public Stage {
   const RunContext* context_ = nullptr;
   mapping::SlamOptions options_;
   bool refine_ = true;
+  int pictures_ = 1000;
   Slams slams_;
   std::optional<RobotCameras> cameras_;
   std::vector<ObservedWay> observed_;     ///< by robot
