@@ -125,7 +125,7 @@ void RobotCameras::use(std::size_t robot, bool again, std::unique_ptr<mapping::S
                                      static_cast<std::int32_t>(slam->frame_poses().size())});
   const std::shared_ptr<const dataset::FrameSource> pictures = recordings_->taken_by(number, camera);
 
-  // What a live source has not kept is not read from a recording either.
+  // A picture that a live source would not have kept is not read from a recording either.
   std::size_t end = std::numeric_limits<std::size_t>::max();
   for (const core::KeyframeId id : slam->map().keyframe_ids()) {
     if (id.index >= pictures_)
