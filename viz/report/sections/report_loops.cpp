@@ -214,6 +214,8 @@ std::string merges_html(const ReportData& data) {
                       {">agreeing", "{/agreeing}"},
                       {">confirmed", "{/confirmed} of {/expected}"},
                       {">landmarks found again", "{/overlay/matched} of {/overlay/expected}"},
+                      {">log-odds: one place", "{/overlay/log_odds:1}"},
+                      {">no like place", "{/log_odds_like:1}"},
                       {"why not", "{/reason:text}"}});
 
   std::string details;
@@ -225,7 +227,10 @@ std::string merges_html(const ReportData& data) {
         folded("Evidence: " + names, merge_evidence(m) + refused_pairs(m), list.size() <= kShownMerges);
   }
 
-  return overview.html() + details;
+  return overview.html() + details +
+         note(
+             "Log-odds (natural logarithm) of the keyframes' pictures, laid over one another: that both maps "
+             "show one place rather than two, and that it is this place rather than one like it.");
 }
 
 /// Report of camera refinement; empty: it was not done, or found nothing.
