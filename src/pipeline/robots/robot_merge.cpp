@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <utility>
 
 #include "robots/robot_components.hpp"
@@ -45,10 +46,14 @@ void report(const RobotMerge& merge, core::Log& log) {
 
 std::string left_out(const std::vector<RobotMap>& parts, const std::vector<std::size_t>& used,
                      const std::vector<RobotMerge>& merges) {
+  // Robots are named once, and those of which a component was used are not left out.
   std::string names;
-  for (std::size_t p = 0; p < parts.size(); ++p) {
-    if (parts[p].component || std::binary_search(used.begin(), used.end(), p)) continue;
-    names += (names.empty() ? "" : ", ") + parts[p].name;
+  std::set<std::int32_t> known;
+  for (const std::size_t p : used) {
+    for (const RobotInfo& robot : parts[p].robots) known.insert(robot.number);
+  }
+  for (const RobotMap& part : parts) {
+    if (known.insert(part.robots.front().number).second) names += (names.empty() ? "" : ", ") + part.name;
   }
   if (names.empty()) return {};
   std::string text = fmt::format("{} of {} maps do not connect and are left out: {}",

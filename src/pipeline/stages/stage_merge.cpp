@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -165,9 +166,18 @@ class MergeStage : public Stage {
   static void report_stored_frames(const MapResult& result, Json& frames) {
     const auto tracked = std::count_if(result.frame_poses.begin(), result.frame_poses.end(),
                                        [](const auto& frame) { return frame.tracked; });
-    frames["read"] = frames["available"] = result.frame_poses.size();
+
+    // Robots of which nothing is in the map count as well.
+    std::size_t all = result.frame_poses.size();
+    std::set<std::int32_t> counted;
+    for (const RobotInfo& robot : result.robots) counted.insert(robot.number);
+    for (const auto& component : result.apart) {
+      if (counted.insert(component->robots.front().number).second) all += component->frame_poses.size();
+    }
+
+    frames["read"] = frames["available"] = all;
     frames["tracked"] = tracked;
-    frames["lost"] = result.frame_poses.size() - static_cast<std::size_t>(tracked);
+    frames["lost"] = all - static_cast<std::size_t>(tracked);
   }
   /// Records the outcome for components that were not joined while their robot mapped.
   void note_components(const std::vector<RobotMap>& parts) {

@@ -111,7 +111,7 @@ class StoreStage : public Stage {
     auto saved = map->apart.empty()
                      ? writer_->save_final(*map->map, map->frame_poses, frame, rest, map->robots)
                      : writer_->save_final(with_components(*map), frames_with_components(*map), frame, rest,
-                                           map->robots);
+                                           robots_with_components(*map));
     writer_.reset();
     return saved;
   }
@@ -182,12 +182,28 @@ class StoreStage : public Stage {
     for (const auto& component : map.apart) all.push_back(component->map.get());
     return maps::joined(all, std::vector<geometry::Rigid3>(all.size()));
   }
+  static std::vector<RobotInfo> robots_with_components(const MapResult& map) {
+    std::vector<RobotInfo> robots = map.robots;
+    for (const auto& component : map.apart) {
+      for (const RobotInfo& robot : component->robots) {
+        const auto same = [&](const RobotInfo& other) { return other.number == robot.number; };
+        if (std::none_of(robots.begin(), robots.end(), same)) robots.push_back(robot);
+      }
+    }
+    return robots;
+  }
   static std::vector<maps::FramePose> frames_with_components(const MapResult& map) {
     std::vector<maps::FramePose> frames = map.frame_poses;
     for (const auto& component : map.apart) {
       std::size_t begin = 0;
       const std::int32_t robot = component->robots.front().number;
       while (begin < frames.size() && frames[begin].reference.robot != robot) ++begin;
+
+      // In a fusion, a robot may have no component in the main map.
+      if (begin == frames.size()) {
+        frames.insert(frames.end(), component->frame_poses.begin(), component->frame_poses.end());
+        continue;
+      }
       for (std::size_t i = 0; i < component->frame_poses.size(); ++i) {
         if (component->frame_poses[i].tracked) frames[begin + i] = component->frame_poses[i];
       }

@@ -86,6 +86,20 @@ TEST_F(Components, WhatNeverJoinsStaysApartAndIsSaid) {
     const auto off = (*again)[i].world_from_camera.translation - (*main_way)[i].world_from_camera.translation;
     EXPECT_LT(off.norm(), 1e-6) << i;
   }
+
+  // Fused with a larger map that it shares no place with, the robot is named, and both its maps are kept.
+  const std::string other = path("other").string(), both = path("both").string();
+  ASSERT_EQ(run("map 'synth:office?frames=200&fps=6&width=320&height=240' -o '" + other + "'" + kLean).code,
+            0);
+  const Outcome fused = run("fuse '" + other + "' '" + out + "' -o '" + both + "'" + kLean);
+  ASSERT_EQ(fused.code, 4) << fused;
+  EXPECT_TRUE(fused.told("components/: out, out-2")) << fused;
+  EXPECT_EQ(summary("both")["frames"]["read"], 540);
+  EXPECT_EQ(summary("both")["components"]["list"].size(), 2U);
+  ASSERT_EQ(run("export '" + both + "' --what trajectory -o '" + path("way.txt").string() + "'").code, 0);
+  const auto way = dataset::read_trajectory(path("way.txt"));
+  ASSERT_TRUE(way) << way.error().message;
+  EXPECT_EQ(way->size(), summary("other")["frames"]["tracked"].get<std::size_t>());
 }
 
 // The same bytes with one thread as with two.
