@@ -229,7 +229,7 @@ std::string merges_html(const ReportData& data) {
 
   return overview.html() + details +
          note(
-             "Log-odds (natural logarithm) of the keyframes' pictures, laid over one another: that both maps "
+             "Log-odds (natural logarithm) of the aligned keyframes' pictures: that both maps "
              "show one place rather than two, and that it is this place rather than one like it.");
 }
 
