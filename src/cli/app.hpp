@@ -74,10 +74,19 @@ void add_time_range(CLI::App& command, dataset::OpenOptions& open);
 void add_live_options(CLI::App& command, pipeline::MapRequest& request);
 /// --publish, for commands that make a map.
 void add_publish_option(CLI::App& command, std::string& address);
-/// Sets request.observer to a publisher to `address`, the value of --publish; `names`, `name`: as for
-/// open_ros2_publisher.
-core::Result<void> prepare_publisher(Session& session, const std::string& address, net::PublishedNames names,
-                                     const std::string& name, pipeline::RunRequest& request);
+/// What is published, and where.
+struct PublishRequest {
+  std::string address;  ///< of --publish; "": nothing
+  std::string frames;   ///< of --frames
+  net::OdomTf odom_tf = net::OdomTf::kAuto;
+  std::size_t robots = 1;  ///< of the run
+};
+/// --publish, --frames and --odom-tf, for commands that map.
+void add_frames_options(CLI::App& command, PublishRequest& publish);
+/// Sets request.observer to a publisher; `names`, `name`: as for open_ros2_publisher.
+core::Result<void> prepare_publisher(Session& session, const PublishRequest& publish,
+                                     net::PublishedNames names, const std::string& name,
+                                     pipeline::RunRequest& request);
 /// Called after the command line is parsed: sets the function that opens addresses, and the stop token.
 void prepare_live(pipeline::MapRequest& request);
 /// Takes these words alone, each for a value of an enumeration: CLI11's own check shows the numbers behind

@@ -31,10 +31,41 @@ void add_publish_option(CLI::App& command, std::string& address) {
       ->type_name("ros2://DOMAIN");
 }
 
-core::Result<void> prepare_publisher(Session& session, const std::string& address, net::PublishedNames names,
-                                     const std::string& name, pipeline::RunRequest& request) {
-  if (address.empty()) return {};
-  auto publisher = net::open_ros2_publisher(address, names, name, session.console());
+void add_frames_options(CLI::App& command, PublishRequest& publish) {
+  add_publish_option(command, publish.address);
+  command
+      .add_option(
+          "--frames", publish.frames,
+          "With --publish: names of frames on /tf, as they are: map, odom, base (the robot's base, above the "
+          "camera by /tf_static) and camera (the colour camera's optical frame)")
+      ->type_name("base=base_link,...");
+  command
+      .add_option("--odom-tf", publish.odom_tf,
+                  "With a base: odom -> base is published by us (own), by somebody else (other), or by us "
+                  "unless somebody else is heard (auto)")
+      ->transform(one_of<net::OdomTf>(
+          {{"own", net::OdomTf::kOwn}, {"other", net::OdomTf::kOther}, {"auto", net::OdomTf::kAuto}}))
+      ->type_name("own|other|auto");
+}
+
+core::Result<void> prepare_publisher(Session& session, const PublishRequest& publish,
+                                     net::PublishedNames names, const std::string& name,
+                                     pipeline::RunRequest& request) {
+  if (publish.address.empty()) {
+    if (publish.frames.empty()) return {};
+    return core::usage_error("--frames names what --publish ros2://DOMAIN sends; give that too");
+  }
+  auto frames = net::parse_published_frames(publish.frames);
+  if (!frames) return tl::unexpected<core::Error>(frames.error());
+  if (frames->given() && publish.robots > 1) {
+    return core::usage_error(
+        "--frames: names are those of one robot; map each recording in a run of its own, or leave it out: "
+        "frames "
+        "then begin with the robots' names");
+  }
+
+  frames->odom_tf = publish.odom_tf;
+  auto publisher = net::open_ros2_publisher(publish.address, names, name, *frames, session.console());
   if (!publisher) return tl::unexpected<core::Error>(publisher.error());
   request.observer = std::move(*publisher);
   return {};

@@ -33,16 +33,44 @@ enum class PublishedNames {
   kOfEach,  ///< always the robot's name as prefix, because others may join
 };
 
+/// Who publishes the pose of the robot's base in the frame `odom` on /tf.
+enum class OdomTf {
+  kOwn,    ///< the publisher
+  kOther,  ///< somebody else; only map -> odom is published
+  kAuto,   ///< somebody else if that is heard within two seconds or later, else the publisher
+};
+
+/// Names of frames on /tf, and how the camera is mounted.
+struct PublishedFrames {
+  std::string map = "map";
+  std::string odom = "odom";
+  std::string camera;  ///< the colour camera's optical frame; "": "camera", or with a base
+                       ///< "camera_color_optical_frame"
+  std::string base;    ///< the robot's base, above the camera by /tf_static; "": /tf ends at the camera
+  OdomTf odom_tf = OdomTf::kAuto;  ///< used with a base
+
+  /// True if any name was given.
+  [[nodiscard]] bool given() const;
+};
+
+/// "map=NAME,odom=NAME,base=NAME,camera=NAME", each at most once. Error (kUsage): what is wrong, and what is
+/// allowed.
+core::Result<PublishedFrames> parse_published_frames(const std::string& text);
+
 /// Publishes the results of a run, as long as the returned object lives, in a thread of its own; a subscriber
 /// that is too slow misses messages and delays nothing. `name`: prefix in any case, or "". Topics are
 /// /plumbline/path (the poses of the keyframes, at the end of all frames), /plumbline/points (the cloud of
 /// each keyframe) and /plumbline/map (the merged cloud, at the end), of a robot or of each of several
 /// /NAME/..., and /tf: map -> odom -> camera, with NAME/ in front. In the frame map x points forward, y left,
-/// z up as the camera stood in its first frame. The destructor waits a moment for listeners to get the last
-/// messages. Error (kUsage): the network cannot be used, or the address names topics.
+/// z up as the camera stood in its first frame; with a base, as that stood. map -> odom is sent with each
+/// frame, lost ones too. `frames`: their names as they are, for a single robot. With a base this waits some
+/// seconds for /tf_static. The destructor waits a moment for listeners to get the last messages. Error
+/// (kUsage): the network cannot be used, the address names topics, or no transform leads from the base to the
+/// camera.
 core::Result<std::shared_ptr<pipeline::RunObserver>> open_ros2_publisher(const std::string& address,
                                                                          PublishedNames names,
                                                                          const std::string& name,
+                                                                         const PublishedFrames& frames,
                                                                          core::Log& log);
 
 /// Function for LiveOptions::open: opens the stream of an address, whose topics replace the given ones.

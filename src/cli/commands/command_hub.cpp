@@ -32,7 +32,8 @@ int hub(Session& session, net::HubRequest request, double quota_gb, const std::s
     session.console().info(request.fuse.output.string() + ": is finished; there is nothing to continue");
     return 0;
   }
-  if (auto prepared = prepare_publisher(session, publish, net::PublishedNames::kOfEach, "", request.fuse);
+  if (auto prepared =
+          prepare_publisher(session, {publish, {}, {}, 1}, net::PublishedNames::kOfEach, "", request.fuse);
       !prepared)
     return session.fail(prepared.error());
 

@@ -32,7 +32,7 @@ std::string stopped_after(const std::filesystem::path& result) {
 }
 
 int map(Session& session, pipeline::MapRequest request, const std::vector<std::string>& inputs,
-        const std::string& publish, const PageAddress& page) {
+        PublishRequest publish, const PageAddress& page) {
   const bool as_given = request.open.poses == dataset::PoseUse::kGiven;
   if (as_given && request.pipeline == pipeline::MapRequest().pipeline) request.pipeline = "known_poses";
   request.input = inputs.front();
@@ -60,6 +60,7 @@ int map(Session& session, pipeline::MapRequest request, const std::vector<std::s
   }
 
   prepare_live(request);
+  publish.robots = inputs.size();
   if (auto prepared = prepare_publisher(session, publish, net::PublishedNames::kOfOne, "", request);
       !prepared)
     return session.fail(prepared.error());
@@ -111,7 +112,7 @@ void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& 
 void add_map(CLI::App& app, Session& session) {
   const auto request = std::make_shared<pipeline::MapRequest>();
   const auto inputs = std::make_shared<std::vector<std::string>>();
-  const auto publish = std::make_shared<std::string>();
+  const auto publish = std::make_shared<PublishRequest>();
   const auto page = std::make_shared<PageAddress>();
   const auto poses_are = std::make_shared<std::string>();
 
@@ -141,7 +142,7 @@ void add_map(CLI::App& app, Session& session) {
           "Convention of the poses that come with a recording: inverted (camera from world), opengl (y up, z "
           "backwards), wxyz (quaternions begin with w)")
       ->check(CLI::IsMember({"inverted", "opengl", "wxyz"}));
-  add_publish_option(*command, *publish);
+  add_frames_options(*command, *publish);
   add_map_options(*command, session, *request);
   add_live_options(*command, *page);
 

@@ -25,7 +25,7 @@ int finish(Session& session, const core::Result<net::RobotOutcome>& outcome,
   return code;
 }
 
-int robot(Session& session, net::RobotRequest request, const std::string& publish) {
+int robot(Session& session, net::RobotRequest request, const PublishRequest& publish) {
   if (auto equipped = session.equip(request.map); !equipped) return session.fail(equipped.error());
   prepare_live(request.map);
   if (auto prepared =
@@ -63,7 +63,7 @@ int robot(Session& session, net::RobotRequest request, const std::string& publis
 void add_robot(CLI::App& app, Session& session) {
   const auto request = std::make_shared<net::RobotRequest>();
   request->map.pipeline = "robot";
-  const auto publish = std::make_shared<std::string>();
+  const auto publish = std::make_shared<PublishRequest>();
 
   CLI::App* command =
       add_command(app, session, "robot", "Map a recording and send the map to a hub meanwhile",
@@ -85,7 +85,7 @@ void add_robot(CLI::App& app, Session& session) {
       ->type_name("OUT");
 
   add_network_options(*command, request->network);
-  add_publish_option(*command, *publish);
+  add_frames_options(*command, *publish);
   command
       ->add_option_function<std::string>(
           "--feedback", [request](const std::string& choice) { request->feedback = choice == "on"; },

@@ -66,6 +66,7 @@ struct TransformMessage {
   std::string parent;
   std::string child;
   geometry::Rigid3 parent_from_child;
+  std::int64_t stamp_ns = 0;  ///< set by CDR's decoder
 };
 
 /// nav_msgs/Path: all poses in the header's frame

@@ -30,6 +30,21 @@ MessageBytes transforms_message(const std::vector<NamedTransform>& transforms, d
       [&](const MessageEncoder& encoder) { return encoder.transforms(messages, stamp_ns_of(stamp)); });
 }
 
+core::Result<std::vector<std::pair<double, NamedTransform>>> read_transforms(
+    const std::vector<std::uint8_t>& bytes) {
+  const auto& part = core::part<BagReaders>();
+  if (!part) return tl::unexpected(part.error());
+  auto messages = (*part)->cdr().transforms(bytes);
+  if (!messages) return core::input_error("tf2_msgs/TFMessage " + messages.error());
+
+  std::vector<std::pair<double, NamedTransform>> transforms;
+  for (TransformMessage& m : *messages) {
+    transforms.push_back({1e-9 * static_cast<double>(m.stamp_ns),
+                          {std::move(m.parent), std::move(m.child), m.parent_from_child}});
+  }
+  return transforms;
+}
+
 MessageBytes path_message(const std::string& frame, const geometry::Trajectory& path) {
   const double stamp = path.empty() ? 0.0 : path.back().stamp;
   return encoded([&](const MessageEncoder& encoder) {

@@ -4,12 +4,19 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
+#include <chrono>
 #include <cmath>
 #include <cstring>
+#include <map>
+#include <mutex>
+#include <set>
+#include <sstream>
+#include <thread>
 #include <utility>
 
 #include "plumbline/net/ros2.hpp"
 #include "ros2/outgoing.hpp"
+#include "ros2/transform_listener.hpp"
 
 namespace plumbline::net {
 namespace {
@@ -62,9 +69,17 @@ std::vector<std::uint8_t> packed(const cloud::Cloud& cloud, const Rigid3& frame_
 
 class Ros2Publisher final : public pipeline::RunObserver {
  public:
+  /// `others` and `base_from_camera`: with a base.
   Ros2Publisher(std::unique_ptr<dataset::MessageSink> sink, PublishedNames names, std::string name,
-                core::Log& log)
-      : names_(names), name_(std::move(name)), outgoing_(std::move(sink), log) {}
+                PublishedFrames frames, std::unique_ptr<TransformListener> others,
+                const Rigid3& base_from_camera, core::Log& log)
+      : names_(names),
+        name_(std::move(name)),
+        frames_(std::move(frames)),
+        log_(log),
+        body_(base_from_camera),
+        others_(std::move(others)),
+        outgoing_(std::move(sink), log) {}
 
   void begins(const std::vector<std::string>& robots) override {
     robots_.clear();
@@ -73,15 +88,39 @@ class Ros2Publisher final : public pipeline::RunObserver {
   }
 
   void placed(std::int32_t robot, double stamp, const Rigid3& shared_from_map) override {
-    post_transforms({{"map", frame(robot, "map"), body_ * shared_from_map * body_.inverse()}}, stamp);
+    post_transforms({{"map", frame(robot, frames_.map), body_ * shared_from_map * body_.inverse()}}, stamp);
   }
 
   void tracked(std::int32_t robot, double stamp, const Rigid3& map_from_camera,
                const Rigid3& odometry_from_camera) override {
-    const Rigid3 map_from_odometry = body_ * map_from_camera * (body_ * odometry_from_camera).inverse();
-    post_transforms({{frame(robot, "map"), frame(robot, "odom"), map_from_odometry},
-                     {frame(robot, "odom"), frame(robot, "camera"), body_ * odometry_from_camera}},
-                    stamp);
+    const Rigid3 map_from_body = body_ * map_from_camera * body_of_camera().inverse();
+    Rigid3 odometry_from_body = body_ * odometry_from_camera * body_of_camera().inverse();
+    const bool other = another_publishes();
+    if (other) {
+      const auto theirs = others_->base_at(stamp);
+      if (!theirs) return;
+      odometry_from_body = *theirs;
+    }
+
+    const Rigid3 map_from_odometry = map_from_body * odometry_from_body.inverse();
+    std::vector<dataset::NamedTransform> transforms = {
+        {frame(robot, frames_.map), frame(robot, frames_.odom), map_from_odometry}};
+    if (!other)
+      transforms.push_back({frame(robot, frames_.odom), frame(robot, body_name()), odometry_from_body});
+    if (others_ != nullptr && !other) others_->sends(stamp);
+    post_transforms(std::move(transforms), stamp);
+
+    const std::lock_guard lock(mutex_);
+    corrections_[robot] = map_from_odometry;
+  }
+
+  /// A frame without a pose: the correction stays as it was.
+  void processed(const pipeline::LivePose& pose) override {
+    if (pose.world_from_camera || robots_.size() != 1) return;
+    const std::lock_guard lock(mutex_);
+    const auto known = corrections_.find(0);
+    if (known == corrections_.end()) return;
+    post_transforms({{frame(0, frames_.map), frame(0, frames_.odom), known->second}}, pose.stamp);
   }
 
   void keyframes(std::int32_t robot, const geometry::Trajectory& path) override {
@@ -91,8 +130,8 @@ class Ros2Publisher final : public pipeline::RunObserver {
   void added(std::int32_t robot, double stamp, const Rigid3& map_from_cloud,
              const cloud::Cloud& cloud) override {
     // The cloud goes on to others: what is sent is made of it now.
-    post_points(topic(robot, "points"), frame(robot, "map"), stamp, packed(cloud, body_ * map_from_cloud),
-                false);
+    post_points(topic(robot, "points"), frame(robot, frames_.map), stamp,
+                packed(cloud, body_ * map_from_cloud), false);
   }
 
   void finished(const std::vector<geometry::Trajectory>& paths, const Rigid3& map_from_cloud,
@@ -116,15 +155,41 @@ class Ros2Publisher final : public pipeline::RunObserver {
   [[nodiscard]] std::string topic(std::int32_t robot, const char* what) const {
     return fmt::format("/{}/{}", prefix(robot).empty() ? "plumbline" : prefix(robot), what);
   }
-  [[nodiscard]] std::string frame(std::int32_t robot, const char* what) const {
-    return prefix(robot).empty() ? what : prefix(robot) + "/" + what;
+  /// Names that were given are used as they are.
+  [[nodiscard]] std::string frame(std::int32_t robot, const std::string& what) const {
+    return prefix(robot).empty() || frames_.given() ? what : prefix(robot) + "/" + what;
+  }
+  [[nodiscard]] std::string body_name() const {
+    if (!frames_.base.empty()) return frames_.base;
+    return frames_.camera.empty() ? "camera" : frames_.camera;
+  }
+  /// Without a base, the lowest frame is the camera's, whose axes are its own.
+  [[nodiscard]] Rigid3 body_of_camera() const { return frames_.base.empty() ? Rigid3() : body_; }
+
+  /// True if the pose of the base comes from somebody else; says so when that begins.
+  [[nodiscard]] bool another_publishes() {
+    if (others_ == nullptr || frames_.odom_tf == OdomTf::kOwn) return false;
+    const std::string parent = others_->other_parent();
+    if (frames_.odom_tf == OdomTf::kOther) return true;
+    if (parent.empty()) return false;
+    if (parent == frames_.odom) {
+      if (!std::exchange(told_other_, true))
+        log_.info(fmt::format("/tf: somebody else publishes {} -> {}: only {} -> {} is published", parent,
+                              frames_.base, frames_.map, frames_.odom));
+    } else if (!std::exchange(told_other_, true)) {
+      log_.warning(
+          fmt::format("/tf: somebody else publishes {} -> {}, so {} -> {} is not published any more; "
+                      "give --frames odom={}",
+                      parent, frames_.base, frames_.odom, frames_.base, parent));
+    }
+    return true;
   }
   /// Topic of data of all robots together.
   [[nodiscard]] std::string shared_topic(const char* what) const {
     return !several(robots_.size()) ? topic(0, what) : fmt::format("/plumbline/{}", what);
   }
   [[nodiscard]] std::string shared_frame() const {
-    return !several(robots_.size()) ? frame(0, "map") : "map";
+    return !several(robots_.size()) ? frame(0, frames_.map) : "map";
   }
 
   void post_transforms(std::vector<dataset::NamedTransform> transforms, double stamp) {
@@ -135,7 +200,7 @@ class Ros2Publisher final : public pipeline::RunObserver {
 
   void post_path(std::int32_t robot, const geometry::Trajectory& path, const Rigid3& frame_from_map,
                  bool at_end) {
-    const std::string in = at_end ? shared_frame() : frame(robot, "map");
+    const std::string in = at_end ? shared_frame() : frame(robot, frames_.map);
     outgoing_.post({topic(robot, "path"), kPath,
                     [in, poses = moved(path, frame_from_map)] { return dataset::path_message(in, poses); },
                     at_end});
@@ -151,16 +216,69 @@ class Ros2Publisher final : public pipeline::RunObserver {
 
   const PublishedNames names_;
   const std::string name_;
-  const Rigid3 body_ = body_from_optical();
+  const PublishedFrames frames_;
+  core::Log& log_;
+  const Rigid3 body_;  ///< body_from_camera: of the base if there is one, else x ahead and z up
+  const std::unique_ptr<TransformListener> others_;  ///< null: without a base
+  bool told_other_ = false;
   std::vector<std::string> robots_;  ///< prefix of names, by number; "": none
+  std::mutex mutex_;
+  std::map<std::int32_t, Rigid3> corrections_;  ///< map_from_odometry, by robot
   Outgoing outgoing_;
 };
 
+/// base_from_camera by /tf_static, and somebody else's pose of the base if it is waited for.
+core::Result<Rigid3> mounted(const PublishedFrames& frames, const TransformListener& others, core::Log& log) {
+  constexpr std::chrono::seconds kStatic(5), kOthers(2);
+  const auto begin = std::chrono::steady_clock::now();
+  const auto mount = others.wait_for(frames.base, frames.camera, kStatic);
+  if (!mount) {
+    return core::usage_error(fmt::format(
+        "--frames: no transform leads from {} to {} on /tf_static within {} s; start robot_state_publisher "
+        "or a "
+        "static_transform_publisher first, or name other frames (camera=: the colour camera's optical frame)",
+        frames.base, frames.camera, kStatic.count()));
+  }
+
+  while (frames.odom_tf == OdomTf::kAuto && others.other_parent().empty() &&
+         std::chrono::steady_clock::now() - begin < kOthers)
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  if (frames.odom_tf == OdomTf::kAuto && others.other_parent().empty())
+    log.info(fmt::format("/tf: nobody publishes {} -> {}: it is published", frames.odom, frames.base));
+  return *mount;
+}
+
 }  // namespace
+
+bool PublishedFrames::given() const {
+  return map != "map" || odom != "odom" || !camera.empty() || !base.empty();
+}
+
+core::Result<PublishedFrames> parse_published_frames(const std::string& text) {
+  PublishedFrames frames;
+  const std::map<std::string, std::string*> names = {
+      {"map", &frames.map}, {"odom", &frames.odom}, {"base", &frames.base}, {"camera", &frames.camera}};
+  std::set<std::string> seen;
+  std::istringstream in(text);
+  for (std::string word; std::getline(in, word, ',');) {
+    const std::size_t equals = word.find('=');
+    const std::string key = word.substr(0, equals);
+    const auto found = names.find(key);
+    if (equals == std::string::npos || equals + 1 == word.size() || found == names.end() ||
+        !seen.insert(key).second) {
+      return core::usage_error(
+          fmt::format("--frames {}: '{}' is not NAME=FRAME with each of map, odom, base, camera at most once",
+                      text, word));
+    }
+    *found->second = word.substr(equals + 1);
+  }
+  return frames;
+}
 
 core::Result<std::shared_ptr<pipeline::RunObserver>> open_ros2_publisher(const std::string& address,
                                                                          PublishedNames names,
                                                                          const std::string& name,
+                                                                         const PublishedFrames& frames,
                                                                          core::Log& log) {
   const auto parsed = parse_ros2_address(address);
   if (!parsed) return tl::unexpected(parsed.error());
@@ -170,7 +288,21 @@ core::Result<std::shared_ptr<pipeline::RunObserver>> open_ros2_publisher(const s
   }
   auto sink = open_ros2_sink(*parsed);
   if (!sink) return tl::unexpected(sink.error());
-  return std::make_shared<Ros2Publisher>(std::move(*sink), names, name, log);
+
+  PublishedFrames named = frames;
+  Rigid3 body = body_from_optical();
+  std::unique_ptr<TransformListener> others;
+  if (!named.base.empty()) {
+    if (named.camera.empty()) named.camera = "camera_color_optical_frame";
+    auto stream = open_ros2_stream(*parsed);
+    if (!stream) return tl::unexpected(stream.error());
+    others = std::make_unique<TransformListener>(std::move(*stream), named.base);
+    const auto mount = mounted(named, *others, log);
+    if (!mount) return tl::unexpected(mount.error());
+    body = *mount;
+  }
+  return std::make_shared<Ros2Publisher>(std::move(*sink), names, name, std::move(named), std::move(others),
+                                         body, log);
 }
 
 }  // namespace plumbline::net

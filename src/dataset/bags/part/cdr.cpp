@@ -165,7 +165,8 @@ DecodedMessage<std::vector<TransformMessage>> read_transforms(const Bytes& bytes
     const auto& from = sample->transforms._buffer[i];
     const geometry::Rigid3 motion = rigid_of(from.transform);
     if (!is_motion(motion)) continue;
-    transforms.push_back({text_of(from.header.frame_id), text_of(from.child_frame_id), motion});
+    transforms.push_back({text_of(from.header.frame_id), text_of(from.child_frame_id), motion,
+                          nanoseconds_of(from.header.stamp)});
   }
   return transforms;
 }

@@ -102,9 +102,14 @@ Ros2Participant::~Ros2Participant() {
 core::Result<void> Ros2Participant::open(const NetworkOptions& options, Ros2Role role) {
   // A process has one domain of each number, and one configuration of it: robots and hubs use the numbers
   // themselves. On the network they are the same.
+  constexpr int kMostOfARole = 8, kApart = 10'000;
   const int base = role == Ros2Role::kListener ? 1000 : 2000;
-  const auto id = static_cast<dds_domainid_t>(base + options.domain);
-  domain_ = dds_create_domain(id, configuration(options).c_str());
+  dds_domainid_t id = 0;
+  domain_ = DDS_RETCODE_PRECONDITION_NOT_MET;
+  for (int k = 0; k < kMostOfARole && domain_ == DDS_RETCODE_PRECONDITION_NOT_MET; ++k) {
+    id = static_cast<dds_domainid_t>(base + kApart * k + options.domain);
+    domain_ = dds_create_domain(id, configuration(options).c_str());
+  }
   if (domain_ > 0) participant_ = dds_create_participant(id, nullptr, nullptr);
   if (participant_ > 0) return {};
   const dds_return_t code = domain_ <= 0 ? domain_ : participant_;
