@@ -74,7 +74,7 @@ void add_time_range(CLI::App& command, dataset::OpenOptions& open);
 void add_live_options(CLI::App& command, pipeline::MapRequest& request);
 /// --publish, for commands that make a map.
 void add_publish_option(CLI::App& command, std::string& address);
-/// What is published, and where.
+/// Topics and frames of a run on ROS 2's network.
 struct PublishRequest {
   std::string address;  ///< of --publish; "": nothing
   std::string frames;   ///< of --frames
