@@ -7,6 +7,7 @@ void register_stages(StageRegistry& registry) {
   registry.add(read_stage());
   registry.add(features_stage());
   registry.add(track_stage());
+  registry.add(localize_stage());
   registry.add(poses_stage());
   registry.add(cloud_stage());
   registry.add(refine_stage());
