@@ -33,6 +33,7 @@ bool same(sensor::Camera a, sensor::Camera b) {
 core::Result<LocalizationMap> open_localization_map(const fs::path& input) {
   const auto place = maps::find_map(input);
   if (!place) return tl::unexpected<core::Error>(place.error());
+
   const fs::path& store = place->store;
   if (store.empty()) {
     return core::input_error(fmt::format(
@@ -53,7 +54,8 @@ core::Result<LocalizationMap> open_localization_map(const fs::path& input) {
   if (!stored.complete) return unfinished();
   if (stored.map.keyframe_count() == 0)
     return core::input_error(fmt::format("{}: has no keyframes; map the recording again", store.string()));
-  return LocalizationMap{stored.map, stored.header.robots, stored.result.output_from_map};
+  return LocalizationMap{stored.map, stored.header.robots, stored.result.output_from_map,
+                         stored.result.upright};
 }
 
 std::optional<sensor::Camera> refined_in(const LocalizationMap& map, const sensor::Camera& given) {

@@ -14,7 +14,7 @@ using geometry::Rigid3;
 
 namespace {
 
-constexpr std::size_t kHits = 20;    // keyframes among which places are told apart
+constexpr std::size_t kHits = 20;    // keyframes that are looked at
 constexpr int kSamePlace = 20;       // shared landmarks
 constexpr double kSamePose_m = 0.2;  // poses of one place
 constexpr double kSamePose_rad = 0.2;
@@ -69,6 +69,7 @@ PlaceAnswer PlaceSearch::find(const sensor::RgbdFrame& frame, const Features& fe
       if (answer.reason.empty()) answer.reason = "looks like a place, but " + place.refused;
       continue;
     }
+
     const Rigid3 pose = place.query_from_match * map_.map.camera_from_world(hit.keyframe);
     if (answer.keyframe && mapping::is_near(pose, answer.camera_from_world, kSamePose_m, kSamePose_rad))
       continue;

@@ -16,9 +16,10 @@
 namespace plumbline::localize {
 
 struct LocalizationMap {
-  maps::Map map;                         ///< of all robots that met
-  std::vector<maps::RobotInfo> robots;   ///< robots of the map's ids, with their cameras
-  geometry::Rigid3 output_from_map;      ///< leads to the frame of the map's results
+  maps::Map map;                        ///< of all robots that met
+  std::vector<maps::RobotInfo> robots;  ///< robots of the map's ids, with their cameras
+  geometry::Rigid3 output_from_map;     ///< leads to the frame of the map's results
+  bool upright = false;                 ///< z is up in that frame
 };
 
 /// Reads a result folder, a fused map or a map.db; several programs may do so at once, also from a read-only

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Where in a finished map one image was taken: place recognition over the keyframes of all robots, verified
-// as loops are (docs/method/localization.md).
+// The place in a finished map where one image was taken: place recognition over the keyframes of all robots,
+// verified as loops are (docs/method/localization.md).
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -19,9 +19,9 @@
 namespace plumbline::localize {
 
 struct PlaceSearchOptions {
-  int candidates = 4;              ///< places that are verified, at most
-  double min_score = 0.015;        ///< least similarity of the images
-  double max_alternative = 0.5;    ///< largest share of the evidence that a second place may have
+  int candidates = 4;            ///< places that are verified, at most
+  double min_score = 0.015;      ///< least similarity of the images
+  double max_alternative = 0.5;  ///< largest share of the evidence that a second place may have
   std::uint64_t seed = 1;
   places::VocabularyOptions vocabulary;
   mapping::VerificationOptions verify;

@@ -27,7 +27,7 @@ struct MapRequest : RunRequest {
   dataset::OpenOptions open;        ///< format, camera, from, to, every
   /// A finished map in which the recording is located, by a pipeline with a localize stage; empty: none.
   std::filesystem::path known_map;
-  bool resume = false;              ///< continue an interrupted run from OUT.partial
+  bool resume = false;  ///< continue an interrupted run from OUT.partial
   /// Highest rate at which each recording is played, frames a second; 0: as fast as possible.
   double pace_hz = 0.0;
   /// Folder for one picture of the tracker's view per frame; empty: none.

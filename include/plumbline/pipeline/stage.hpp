@@ -142,7 +142,8 @@ struct RunInput {
   RobotRecordings* recordings = nullptr;                 ///< `source`, when recordings are mapped; else null
   const maps::StoredMaps* stored_maps = nullptr;         ///< input of a maps stage; null: there is none
   const std::vector<maps::RobotInfo>* robots = nullptr;  ///< robots of the recordings or maps, by number
-  std::shared_ptr<const localize::LocalizationMap> known_map;  ///< map of a localize stage; null: there is none
+  std::shared_ptr<const localize::LocalizationMap>
+      known_map;       ///< map of a localize stage; null: there is none
   std::string anchor;  ///< robot that defines the common frame of finished maps; empty: any
   std::string text;    ///< text that identifies what is mapped
 };

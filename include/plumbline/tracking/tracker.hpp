@@ -102,8 +102,8 @@ class Tracker {
   /// Localises a frame in `map`. An empty map gives kInitialising.
   TrackResult track(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features);
 
-  /// The same in a map that is not empty, from the motion model alone: a frame that is not found so is lost, and not
-  /// looked for by its appearance.
+  /// The same in a map that is not empty, from the motion model alone: a frame that is not found so is lost,
+  /// and not looked for by its appearance.
   TrackResult follow(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features);
 
   /// Sets the readout time from the camera's file (sensor::Camera::readout_s), in place of the option; none:

@@ -33,8 +33,7 @@ void add_localize(CLI::App& app, Session& session) {
   CLI::App* command =
       add_command(app, session, "localize", "Locate a camera in a finished map, which stays as it is",
                   [&session, request, publish] { return localize(session, *request, *publish); });
-  command
-      ->add_option("MAP", request->known_map, "Result folder of plumbline map, fuse or hub, or its map.db")
+  command->add_option("MAP", request->known_map, "Result folder of plumbline map, fuse or hub, or its map.db")
       ->required();
   command->add_option("INPUT", request->input, "A recording or a live camera, as for map")->required();
   command->add_option("-o,--output", request->output, "Folder for the result")->required()->type_name("OUT");

@@ -16,7 +16,8 @@ namespace plumbline::pipeline {
 std::string row_columns(const mapping::FrameReport& report);
 /// The names of these columns, comma-separated.
 std::string row_column_names();
-/// One line for every frame of the run, the unreadable ones too; `columns`: names of FrameRow::columns. Errors (kOutput).
+/// One line for every frame of the run, the unreadable ones too; `columns`: names of FrameRow::columns.
+/// Errors (kOutput).
 core::Result<void> write_frame_rows(const std::filesystem::path& file, const std::string& columns,
                                     const std::vector<FrameRow>& rows, std::size_t frames);
 

@@ -185,6 +185,7 @@ core::Result<void> fits(const Graph& graph, const MapRequest& request) {
     return core::usage_error(
         fmt::format("{}: has no track stage to draw; leave out --debug-video", graph.file.string()));
   }
+
   if (request.open.poses == dataset::PoseUse::kGiven && !any_stage(graph, &Stage::takes_given_poses)) {
     return core::usage_error(
         fmt::format("{}: has no stage 'poses' for given poses; leave out --poses given, "
@@ -197,6 +198,7 @@ core::Result<void> fits(const Graph& graph, const MapRequest& request) {
                                   : "{}: has no localize stage; plumbline localize needs one",
         graph.file.string()));
   }
+
   if (graph.source().stage->reads_maps()) {
     return core::usage_error(
         fmt::format("{}: begins with finished maps; it is run by plumbline fuse", graph.file.string()));

@@ -150,9 +150,11 @@ std::string text_of(const Json& summary) {
 
   if (summary.contains("localized")) {
     const Json& localized = summary.at("localized");
-    return text + fmt::format("located    {} frames ({:.1f} %), in a map of {} keyframes; longest gap {} frames\n",
-                              count(localized.at("located")), 100.0 * localized.at("share").get<double>(),
-                              count(localized.at("keyframes")), count(localized.at("longest_gap"))) + time_text(summary);
+    return text +
+           fmt::format("located    {} frames ({:.1f} %), in a map of {} keyframes; longest gap {} frames\n",
+                       count(localized.at("located")), 100.0 * localized.at("share").get<double>(),
+                       count(localized.at("keyframes")), count(localized.at("longest_gap"))) +
+           time_text(summary);
   }
 
   const Json& landmarks = summary.at("landmarks");

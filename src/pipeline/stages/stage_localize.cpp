@@ -34,8 +34,7 @@ class LocalizeStage : public Stage {
     context_ = &context;
     map_ = context.input.known_map;
     RobotRecordings& recordings = *context.input.recordings;
-    if (recordings.robots().size() > 1)
-      return core::usage_error("localize takes one recording at a time");
+    if (recordings.robots().size() > 1) return core::usage_error("localize takes one recording at a time");
 
     // The camera with which the map was made is read as the map found it.
     sensor::Camera camera = recordings.camera();
@@ -67,8 +66,9 @@ class LocalizeStage : public Stage {
   }
 
   void report(Json& summary) const override {
-    for (const char* of_maps : {"keyframes", "keyframe_causes", "landmarks", "loops", "refine", "path", "merges",
-                                "meetings", "robots", "components", "cloud", "frame", "camera", "camera_pairs"})
+    for (const char* of_maps :
+         {"keyframes", "keyframe_causes", "landmarks", "loops", "refine", "path", "merges", "meetings",
+          "robots", "components", "cloud", "frame", "camera", "camera_pairs"})
       summary.erase(of_maps);
     summary["frames"]["tracked"] = path_.size();
     summary["frames"]["lost"] = rows_.size() - path_.size();
@@ -99,28 +99,39 @@ class LocalizeStage : public Stage {
   /// Keeps the outcome of a frame, and shows it to the observer.
   void note(const localize::LocatedFrame& located) {
     const std::string text = fmt::format("{:.6f},{}", located.stamp, located.how);
-    LivePose live{located.number, located.stamp, located.located ? "tracked" : "lost", std::nullopt, {}};
-    if (located.located) {
-      if (path_.empty()) first_frame_ = located.number;
-      path_.push_back({located.stamp, located.map_from_camera});
-      if (located.how == "place") ++places_;
-      gap_ = 0;
-      live.world_from_camera = located.map_from_camera;
-      rows_.push_back({located.number, "located",
-                       fmt::format("{},{:.6f},{:.7f},{},{},{},{},{:.4f},{:.4f},", text,
-                                   located.sigma_position_m, located.sigma_rotation_rad,
-                                   core::csv_field(name_of(located.keyframe.robot)), located.keyframe.index,
-                                   located.points, located.lines, located.found, located.surface_share)});
-    } else {
+    if (!located.located) {
       longest_gap_ = std::max(longest_gap_, ++gap_);
       last_reason_ = located.reason;
       rows_.push_back({located.number, "lost", text + ",,,,,,,,," + core::csv_field(located.reason)});
+      show({located.number, located.stamp, "lost", std::nullopt, {}});
+      return;
     }
 
+    if (path_.empty()) first_frame_ = located.number;
+    path_.push_back({located.stamp, located.map_from_camera});
+    if (located.how == "place") ++places_;
+    gap_ = 0;
+    rows_.push_back({located.number, "located",
+                     fmt::format("{},{:.6f},{:.7f},{},{},{},{},{:.4f},{:.4f},", text,
+                                 located.sigma_position_m, located.sigma_rotation_rad,
+                                 core::csv_field(name_of(located.keyframe.robot)), located.keyframe.index,
+                                 located.points, located.lines, located.found, located.surface_share)});
+    show({located.number, located.stamp, "tracked", located.map_from_camera, {}});
+  }
+
+  /// Observers expect maps in the frame of a camera, whose y points down.
+  void show(LivePose pose) const {
     RunObserver* observer = context_->hooks.observer;
     if (observer == nullptr) return;
-    observer->processed(live);
-    if (located.located) observer->tracked(0, located.stamp, located.map_from_camera, located.map_from_camera);
+    if (pose.world_from_camera && map_->upright) {
+      Eigen::Matrix3d optical_from_body;
+      optical_from_body << 0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0;
+      pose.world_from_camera =
+          geometry::Rigid3(optical_from_body, Eigen::Vector3d::Zero()) * *pose.world_from_camera;
+    }
+    observer->processed(pose);
+    if (pose.world_from_camera)
+      observer->tracked(0, pose.stamp, *pose.world_from_camera, *pose.world_from_camera);
   }
 
   [[nodiscard]] std::string name_of(std::int32_t robot) const {
@@ -149,7 +160,8 @@ class LocalizeStage : public Stage {
 
 StageType localize_stage() {
   return stage_type<LocalizeStage>("localize", "Locates the camera in a finished map, which stays as it is",
-                                   Mode::kSerial, {{"frame", frame_port()}, {"features", features_port()}}, {});
+                                   Mode::kSerial, {{"frame", frame_port()}, {"features", features_port()}},
+                                   {});
 }
 
 }  // namespace plumbline::pipeline
