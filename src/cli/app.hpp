@@ -64,6 +64,8 @@ void add_plugin_option(CLI::App& command, Session& session);
 void add_progress_option(CLI::App& command, Session& session);
 /// -p, --set, --plugin, --force and --progress.
 void add_pipeline_options(CLI::App& command, Session& session, pipeline::RunRequest& request);
+/// Options for reading a recording or a live camera.
+void add_recording_options(CLI::App& command, pipeline::MapRequest& request);
 /// Adds the options common to all commands that map a recording.
 void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& request);
 /// "701362 4485513 0 m (...)": the shift subtracted from large coordinates when a cloud was read.
@@ -110,6 +112,7 @@ void add_topic_option(CLI::App& command, dataset::OpenOptions& open);
 CLI::App* add_group(CLI::App& parent, const std::string& name, const std::string& help);
 
 void add_map(CLI::App& app, Session& session);
+void add_localize(CLI::App& app, Session& session);
 void add_fuse(CLI::App& app, Session& session);
 void add_hub(CLI::App& app, Session& session);
 void add_robot(CLI::App& app, Session& session);

@@ -62,17 +62,30 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
   motion_.set_odometry(frame.odometry);
   if (map.keyframe_count() == 0) return initialise(frame, features);
 
-  const ImageMotion motion{options_.readout_s * motion_.velocity(),
-                           motion_.motion_within(depth_delay_s(frame))};
-  const TrackedImage image{frame, features, motion, synchronised(features, frame.depth, camera_, motion)};
+  const TrackedImage image = image_of(frame, features);
   const bool outdated = motion_.outdated();
   std::optional<TrackResult> result = outdated ? relocalise(map, image) : track_with_motion_model(map, image);
   if (!result) result = outdated ? track_with_motion_model(map, image) : relocalise(map, image);
-  if (!result) return lost(frame);
+  return result ? recorded(image, *std::move(result)) : lost(frame);
+}
 
-  if (result->features == nullptr) result->features = image.synchronised;
-  record(frame, *result);
-  return *std::move(result);
+TrackResult Tracker::follow(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features) {
+  motion_.set_odometry(frame.odometry);
+  const TrackedImage image = image_of(frame, features);
+  std::optional<TrackResult> result = track_with_motion_model(map, image);
+  return result ? recorded(image, *std::move(result)) : lost(frame);
+}
+
+TrackedImage Tracker::image_of(const sensor::RgbdFrame& frame, const Features& features) const {
+  const ImageMotion motion{options_.readout_s * motion_.velocity(),
+                           motion_.motion_within(depth_delay_s(frame))};
+  return {frame, features, motion, synchronised(features, frame.depth, camera_, motion)};
+}
+
+TrackResult Tracker::recorded(const TrackedImage& image, TrackResult result) {
+  if (result.features == nullptr) result.features = image.synchronised;
+  record(image.frame, result);
+  return result;
 }
 
 TrackResult Tracker::initialise(const sensor::RgbdFrame& frame, const Features& features) {

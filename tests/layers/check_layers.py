@@ -20,7 +20,7 @@ LAYERS = [
     ["maps"],
     ["tracking", "places", "evaluate", "synth", "viewer", "check"],
     ["mapping"],
-    ["viz", "exports"],
+    ["viz", "exports", "localize"],
     ["pipeline", "report"],
     ["net"],
     ["cli", "python"],

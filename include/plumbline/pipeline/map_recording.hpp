@@ -25,7 +25,9 @@ struct MapRequest : RunRequest {
   std::string input;                ///< folder or synth:...
   std::vector<std::string> others;  ///< further recordings, one per robot
   dataset::OpenOptions open;        ///< format, camera, from, to, every
-  bool resume = false;              ///< continue an interrupted run from OUT.partial
+  /// A finished map in which the recording is located, by a pipeline with a localize stage; empty: none.
+  std::filesystem::path known_map;
+  bool resume = false;  ///< continue an interrupted run from OUT.partial
   /// Highest rate at which each recording is played, frames a second; 0: as fast as possible.
   double pace_hz = 0.0;
   /// Folder for one picture of the tracker's view per frame; empty: none.

@@ -45,6 +45,10 @@ namespace plumbline::sensor {
 struct RgbdFrame;
 }
 
+namespace plumbline::localize {
+struct LocalizationMap;
+}
+
 namespace plumbline::mapping {
 class OtherMapsInbox;
 }
@@ -138,6 +142,8 @@ struct RunInput {
   RobotRecordings* recordings = nullptr;                 ///< `source`, when recordings are mapped; else null
   const maps::StoredMaps* stored_maps = nullptr;         ///< input of a maps stage; null: there is none
   const std::vector<maps::RobotInfo>* robots = nullptr;  ///< robots of the recordings or maps, by number
+  std::shared_ptr<const localize::LocalizationMap>
+      known_map;       ///< map of a localize stage; null: there is none
   std::string anchor;  ///< robot that defines the common frame of finished maps; empty: any
   std::string text;    ///< text that identifies what is mapped
 };
@@ -264,6 +270,8 @@ class Stage {
   [[nodiscard]] virtual bool takes_given_poses() const { return false; }
   /// True if it begins with finished maps (RunInput::stored_maps). Called before the run.
   [[nodiscard]] virtual bool reads_maps() const { return false; }
+  /// True if it locates the camera in a finished map (RunInput::known_map). Called before the run.
+  [[nodiscard]] virtual bool knows_map() const { return false; }
   /// True if its clouds are kept in a store until their poses are final. Called before the run.
   [[nodiscard]] virtual bool lays_clouds_down() const { return false; }
 };

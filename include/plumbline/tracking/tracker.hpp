@@ -102,6 +102,10 @@ class Tracker {
   /// Localises a frame in `map`. An empty map gives kInitialising.
   TrackResult track(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features);
 
+  /// The same in a map that is not empty, from the motion model alone: a frame that is not found so is lost,
+  /// and not looked for by its appearance.
+  TrackResult follow(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features);
+
   /// Sets the readout time from the camera's file (sensor::Camera::readout_s), in place of the option; none:
   /// unchanged. A readout of 0 is a global shutter's.
   void set_shutter(std::optional<double> readout_s);
@@ -164,6 +168,8 @@ class Tracker {
 
   [[nodiscard]] TrackResult initialise(const sensor::RgbdFrame& frame, const Features& features);
   [[nodiscard]] TrackResult lost(const sensor::RgbdFrame& frame);
+  [[nodiscard]] TrackedImage image_of(const sensor::RgbdFrame& frame, const Features& features) const;
+  TrackResult recorded(const TrackedImage& image, TrackResult result);
   /// Tracks from the predicted pose; none if no pose found there can be trusted.
   [[nodiscard]] std::optional<TrackResult> track_with_motion_model(const maps::Map& map,
                                                                    const TrackedImage& image) const;

@@ -76,7 +76,7 @@ int map(Session& session, pipeline::MapRequest request, const std::vector<std::s
 
 }  // namespace
 
-void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& request) {
+void add_recording_options(CLI::App& command, pipeline::MapRequest& request) {
   command.add_option("--camera", request.open.camera, "Shipped calibration or file")->type_name("NAME|FILE");
   command.add_option("--format", request.open.format, "Layout of INPUT (default: auto)")
       ->check(CLI::IsMember(dataset::layout_names()));
@@ -87,7 +87,16 @@ void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& 
   command.add_option("--every", request.open.every, "Use every N-th frame")
       ->type_name("N")
       ->check(CLI::Range(1, 100000));
+  command
+      .add_option("--pace", request.pace_hz,
+                  "Play recordings at this rate, like a live camera (default: as fast as possible)")
+      ->type_name("HZ")
+      ->check(CLI::Range(0.0, 1000.0));
+  add_live_options(command, request);
+}
 
+void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& request) {
+  add_recording_options(command, request);
   const std::map<std::string, dataset::PoseUse> uses = {{"prior", dataset::PoseUse::kPrior},
                                                         {"given", dataset::PoseUse::kGiven},
                                                         {"ignore", dataset::PoseUse::kIgnore}};
@@ -97,13 +106,6 @@ void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& 
                   "(default), given maps with the recording's poses as they are, ignore leaves them out")
       ->type_name("prior|given|ignore")
       ->transform(one_of(uses));
-  command
-      .add_option("--pace", request.pace_hz,
-                  "Play recordings at this rate, like a live camera (default: as fast as possible)")
-      ->type_name("HZ")
-      ->check(CLI::Range(0.0, 1000.0));
-
-  add_live_options(command, request);
   command.add_flag("--resume", request.resume,
                    "Continue an interrupted run from OUT.partial, with the same input and settings");
   add_pipeline_options(command, session, request);

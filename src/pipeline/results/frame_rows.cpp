@@ -3,7 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+
+#include "plumbline/core/output_file.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -93,6 +96,23 @@ std::string row_column_names() {
   std::string names;
   for (const Column& column : kColumns) names += (names.empty() ? "" : ",") + std::string(column.name);
   return names;
+}
+
+core::Result<void> write_frame_rows(const std::filesystem::path& file, const std::string& columns,
+                                    const std::vector<FrameRow>& rows, std::size_t frames) {
+  const std::string nothing(static_cast<std::size_t>(std::count(columns.begin(), columns.end(), ',')), ',');
+  core::OutputFile out(file);
+  out.write("frame,state," + columns + "\n");
+  auto row = rows.begin();
+  for (std::size_t f = 0; f < frames; ++f) {
+    if (row != rows.end() && row->frame == f) {
+      out.write(fmt::format("{},{},{}\n", f, row->state, row->columns));
+      ++row;
+    } else {
+      out.write(fmt::format("{},unreadable,{}\n", f, nothing));
+    }
+  }
+  return out.commit();
 }
 
 }  // namespace plumbline::pipeline

@@ -15,6 +15,7 @@
 #include "plumbline/core/shortage.hpp"
 #include "plumbline/core/version.hpp"
 #include "plumbline/dataset/live.hpp"
+#include "plumbline/localize/localization_map.hpp"
 #include "plumbline/maps/output_folder.hpp"
 #include "plumbline/pipeline/graph.hpp"
 #include "plumbline/pipeline/input.hpp"
@@ -53,6 +54,7 @@ std::string config_text(const MapRequest& request, const Graph& graph, int threa
   text += "run:\n";
   text += fmt::format("  input: {}\n  pipeline: {}\n", quoted(request.input), quoted(request.pipeline));
 
+  if (!request.known_map.empty()) text += fmt::format("  map: {}\n", quoted(request.known_map.string()));
   if (const std::string folder = folder_from_result(request); !folder.empty()) {
     text += fmt::format("  folder: {}  # in which the program was run, seen from this one\n", quoted(folder));
   }
@@ -183,12 +185,20 @@ core::Result<void> fits(const Graph& graph, const MapRequest& request) {
     return core::usage_error(
         fmt::format("{}: has no track stage to draw; leave out --debug-video", graph.file.string()));
   }
+
   if (request.open.poses == dataset::PoseUse::kGiven && !any_stage(graph, &Stage::takes_given_poses)) {
     return core::usage_error(
         fmt::format("{}: has no stage 'poses' for given poses; leave out --poses given, "
                     "or the pipeline",
                     graph.file.string()));
   }
+  if (any_stage(graph, &Stage::knows_map) != !request.known_map.empty()) {
+    return core::usage_error(fmt::format(
+        request.known_map.empty() ? "{}: locates a camera in a map; it is run by plumbline localize"
+                                  : "{}: has no localize stage; plumbline localize needs one",
+        graph.file.string()));
+  }
+
   if (graph.source().stage->reads_maps()) {
     return core::usage_error(
         fmt::format("{}: begins with finished maps; it is run by plumbline fuse", graph.file.string()));
@@ -253,6 +263,11 @@ class MapRun {
     graph_ = std::move(*graph);
     if (auto can = fits(graph_, request_); !can) return can;
     if (auto can = fits_live(request_); !can) return can;
+    if (!request_.known_map.empty()) {
+      auto known = localize::open_localization_map(request_.known_map);
+      if (!known) return tl::unexpected(known.error());
+      known_map_ = std::make_shared<localize::LocalizationMap>(std::move(*known));
+    }
     auto source = open_inputs(request_, executor_, log_);
     if (!source) return tl::unexpected(source.error());
     source_ = std::move(*source);
@@ -342,6 +357,7 @@ class MapRun {
     context.input.source = source_.get();
     context.input.recordings = source_.get();
     context.input.robots = &source_->robots();
+    context.input.known_map = known_map_;
     context.input.text = input_text(*source_);
 
     if (resumed_) context.resumed = &*resumed_;
@@ -361,6 +377,7 @@ class MapRun {
   const core::Executor& executor_;
   core::Log& log_;
   Graph graph_;
+  std::shared_ptr<const localize::LocalizationMap> known_map_;
   std::unique_ptr<RobotRecordings> source_;
   std::optional<maps::OutputFolder> output_;
   std::optional<ResumedRun> resumed_;

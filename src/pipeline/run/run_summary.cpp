@@ -104,6 +104,22 @@ std::string live_text(const Json& live) {
   return text;
 }
 
+std::string time_text(const Json& summary) {
+  const Json& timing = summary.at("timing");
+  const auto seconds = [&](const char* name) { return timing.at(name).get<double>(); };
+  std::string text =
+      fmt::format("time       {:.1f} s in all, {:.1f} s of it export: {:.1f} frames a second without that\n",
+                  seconds("wall_s"), seconds("export_s"), seconds("fps"));
+
+  if (seconds("pace_hz") > 0.0) {
+    text += fmt::format("pace       {:g} frames a second; {:.2f} s behind at most\n", seconds("pace_hz"),
+                        seconds("behind_s"));
+  }
+
+  text += fmt::format("memory     {:.0f} MB at most\n", summary.at("memory").at("peak_rss_mb").get<double>());
+  return text;
+}
+
 std::string text_of(const Json& summary) {
   const Json& frames = summary.at("frames");
   const auto count = [](const Json& number) { return number.get<std::size_t>(); };
@@ -132,6 +148,15 @@ std::string text_of(const Json& summary) {
 
   if (summary.contains("live")) text += fmt::format("live       {}\n", live_text(summary.at("live")));
 
+  if (summary.contains("localized")) {
+    const Json& localized = summary.at("localized");
+    return text +
+           fmt::format("located    {} frames ({:.1f} %), in a map of {} keyframes; longest gap {} frames\n",
+                       count(localized.at("located")), 100.0 * localized.at("share").get<double>(),
+                       count(localized.at("keyframes")), count(localized.at("longest_gap"))) +
+           time_text(summary);
+  }
+
   const Json& landmarks = summary.at("landmarks");
   text += fmt::format("map        {} keyframes, {} points, {} lines, {} loops\n",
                       count(summary.at("keyframes")), count(landmarks.at("points")),
@@ -144,19 +169,7 @@ std::string text_of(const Json& summary) {
     if (!without.empty()) text += fmt::format("left out   {}\n", without);
   }
 
-  const Json& timing = summary.at("timing");
-  const auto seconds = [&](const char* name) { return timing.at(name).get<double>(); };
-  text +=
-      fmt::format("time       {:.1f} s in all, {:.1f} s of it export: {:.1f} frames a second without that\n",
-                  seconds("wall_s"), seconds("export_s"), seconds("fps"));
-
-  if (seconds("pace_hz") > 0.0) {
-    text += fmt::format("pace       {:g} frames a second; {:.2f} s behind at most\n", seconds("pace_hz"),
-                        seconds("behind_s"));
-  }
-
-  text += fmt::format("memory     {:.0f} MB at most\n", summary.at("memory").at("peak_rss_mb").get<double>());
-  return text;
+  return text + time_text(summary);
 }
 
 }  // namespace

@@ -7,7 +7,9 @@ void register_stages(StageRegistry& registry) {
   registry.add(read_stage());
   registry.add(features_stage());
   registry.add(track_stage());
+  registry.add(localize_stage());
   registry.add(poses_stage());
+
   registry.add(cloud_stage());
   registry.add(refine_stage());
   registry.add(fuse_stage());
@@ -18,6 +20,7 @@ void register_stages(StageRegistry& registry) {
   registry.add(merge_stage());
   registry.add(check_stage());
   registry.add(output_stage());
+
   registry.add_tap(frame_tap());
   registry.add_tap(features_tap());
   registry.add_tap(track_tap());

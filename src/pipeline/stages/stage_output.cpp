@@ -20,6 +20,7 @@
 #include "plumbline/maps/line_export.hpp"
 #include "plumbline/pipeline/observer.hpp"
 #include "plumbline/viz/snapshot.hpp"
+#include "results/frame_rows.hpp"
 #include "stages/stages.hpp"
 #include "summary/sections.hpp"
 
@@ -100,7 +101,11 @@ class OutputStage : public Stage {
         [&] { return lines_ ? maps::write_lines_ply(folder / "lines.ply", map.lines) : nothing; },
         [&] { return write_trajectories(folder, map); },
         [&] { return write_keyframes(folder / "keyframes.csv", map); },
-        [&] { return map.frames.empty() ? nothing : write_frames(folder / "frames.csv", map, io.frame()); },
+        [&] {
+          return map.frames.empty()
+                     ? nothing
+                     : write_frame_rows(folder / "frames.csv", map.frame_columns, map.frames, io.frame());
+        },
         [&] { return write_components(*given, *dense); },
     };
 
@@ -256,25 +261,6 @@ class OutputStage : public Stage {
                                     sigma_cell(known->sigma_rotation_rad(), 7), known->points, known->lines,
                                     known->edges)
                       : ",,,,\n");
-    }
-    return out.commit();
-  }
-
-  /// One line for every frame of the run, the unreadable ones too.
-  static core::Result<void> write_frames(const std::filesystem::path& file, const MapResult& map,
-                                         std::size_t frames) {
-    const auto commas = std::count(map.frame_columns.begin(), map.frame_columns.end(), ',');
-    const std::string nothing(static_cast<std::size_t>(commas), ',');
-    core::OutputFile out(file);
-    out.write("frame,state," + map.frame_columns + "\n");
-    auto row = map.frames.begin();
-    for (std::size_t f = 0; f < frames; ++f) {
-      if (row != map.frames.end() && row->frame == f) {
-        out.write(fmt::format("{},{},{}\n", f, row->state, row->columns));
-        ++row;
-      } else {
-        out.write(fmt::format("{},unreadable,{}\n", f, nothing));
-      }
     }
     return out.commit();
   }

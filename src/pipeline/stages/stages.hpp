@@ -28,6 +28,7 @@ StageType stage_type(std::string name, std::string help, Mode mode, std::vector<
 StageType read_stage();
 StageType features_stage();
 StageType track_stage();
+StageType localize_stage();
 StageType poses_stage();
 StageType cloud_stage();
 StageType refine_stage();

@@ -65,6 +65,7 @@ TEST_F(EmptyValues, ArgumentsRefuseThem) {
       {"report a ''", "OTHER"},
       {"export ''", "MAP"},
       {"fuse a '' -o x", "MAP"},
+      {"localize '' a -o x", "MAP"},
       {"convert '' x", "INPUT"},
       {"convert a ''", "OUT"},
       {"filter '' a.ply b.ply", "CHAIN"},

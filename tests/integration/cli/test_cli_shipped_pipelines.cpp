@@ -17,7 +17,7 @@ std::vector<std::string> mapping_pipelines() {
   std::vector<std::string> names;
   for (const fs::directory_entry& file : fs::directory_iterator(kPipelines)) {
     const std::string name = file.path().stem().string();
-    if (file.path().extension() == ".yaml" && name != "fuse") names.push_back(name);
+    if (file.path().extension() == ".yaml" && name != "fuse" && name != "localize") names.push_back(name);
   }
   std::sort(names.begin(), names.end());
   return names;
