@@ -240,7 +240,8 @@ void add_plan(MapSource& source, MapView& view) {
                              at(0.5 * (door.jambs[1] + door.far_jambs[1])));
 
   for (const WallRoom& room : plan->rooms)
-    scene.rooms.emplace_back(at(room.label), fmt::format("{:.2f} m²", room.area_m2));
+    scene.rooms.emplace_back(at(room.label),
+                             fmt::format("{}{:.2f} m²", room.closed ? "" : "≥ ", room.area_m2));
   scene.plan_height_m = height;
 }
 

@@ -11,6 +11,7 @@
 #include "formats.hpp"
 #include "plans/drawing.hpp"
 #include "plans/walls.hpp"
+#include "plumbline/core/output_file.hpp"
 #include "plumbline/core/text.hpp"
 #include "source/georeference.hpp"
 
@@ -21,9 +22,10 @@ constexpr double kPlanText_m = 0.14;
 
 /// The layers of a plan, by their numbers in the drawing.
 struct PlanLayers {
-  std::size_t grid, rooms, path, walls, windows, doors, dimensions;
+  std::size_t grid, furniture, rooms, path, walls, windows, doors, dimensions;
   explicit PlanLayers(Drawing& drawing)
       : grid(drawing.add_layer({"grid", "#d0d0d0", 8, 0.1})),
+        furniture(drawing.add_layer({"furniture", "#909090", 9, 0.13})),
         rooms(drawing.add_layer({"rooms", "#3a6ea5", 5, 0.15})),
         path(drawing.add_layer({"path", "#c08020", 30, 0.15})),
         walls(drawing.add_layer({"walls", "#000000", 7, 0.6})),
@@ -31,23 +33,6 @@ struct PlanLayers {
         doors(drawing.add_layer({"doors", "#b03030", 1, 0.25})),
         dimensions(drawing.add_layer({"dimensions", "#505050", 3, 0.13})) {}
 };
-
-/// The wall's pieces between its doors and gaps.
-std::vector<std::pair<double, double>> solid_pieces(const WallLine& wall) {
-  std::vector<WallOpening> openings = wall.openings;
-  openings.insert(openings.end(), wall.gaps.begin(), wall.gaps.end());
-  std::sort(openings.begin(), openings.end(),
-            [](const WallOpening& a, const WallOpening& b) { return a.s0 < b.s0; });
-
-  std::vector<std::pair<double, double>> pieces;
-  double from = wall.s0;
-  for (const WallOpening& opening : openings) {
-    if (opening.s0 > from) pieces.emplace_back(from, opening.s0);
-    from = std::max(from, opening.s1);
-  }
-  if (wall.s1 > from) pieces.emplace_back(from, wall.s1);
-  return pieces;
-}
 
 void draw_walls(const WallPlan& plan, const PlanLayers& layers, Drawing& drawing) {
   constexpr double kDimensioned_m = 1.0;
@@ -78,6 +63,18 @@ void draw_doors(const WallPlan& plan, const PlanLayers& layers, Drawing& drawing
   }
 }
 
+/// A dashed line, in dashes that all forms can hold.
+void draw_dashed(std::size_t layer, const Eigen::Vector2d& from, const Eigen::Vector2d& to,
+                 Drawing& drawing) {
+  constexpr double kDash_m = 0.1;
+  constexpr double kPitch_m = 0.16;
+  const double length = (to - from).norm();
+  for (double s = 0.0; s < length; s += kPitch_m)
+    drawing.line(layer, from + s / length * (to - from),
+                 from + std::min(s + kDash_m, length) / length * (to - from));
+}
+
+/// Numbers and areas, and dashed what is assumed or the limit of what was seen.
 void draw_rooms(const WallPlan& plan, const PlanLayers& layers, Drawing& drawing) {
   int number = 0;
   for (const WallRoom& room : plan.rooms) {
@@ -85,7 +82,31 @@ void draw_rooms(const WallPlan& plan, const PlanLayers& layers, Drawing& drawing
     text.layer = layers.rooms;
     text.at = room.label;
     text.height_m = 1.4 * kPlanText_m;
-    text.text = fmt::format("{}: {:.2f} m2", ++number, room.area_m2);
+    text.text = fmt::format("{}: {}{:.2f} m2", ++number, room.closed ? "" : "at least ", room.area_m2);
+    drawing.texts.push_back(text);
+    for (std::size_t i = 0; i < room.outline.size(); ++i) {
+      if (room.side(i) != RoomSide::kWall)
+        draw_dashed(layers.rooms, room.outline[i], room.outline[(i + 1) % room.outline.size()], drawing);
+    }
+  }
+}
+
+/// The table of rooms, below everything.
+void draw_room_table(const WallPlan& plan, const PlanLayers& layers, Drawing& drawing) {
+  constexpr double kLine_m = 2.2 * kPlanText_m;
+  const Eigen::Vector2d low = drawing.bounds().first;
+  for (std::size_t i = 0; i < plan.rooms.size(); ++i) {
+    const WallRoom& room = plan.rooms[i];
+    DrawnText text;
+    text.layer = layers.dimensions;
+    text.height_m = kPlanText_m;
+    text.text = fmt::format("Room {}: area {}{:.2f} m2, perimeter {:.2f} m, height {}", i + 1,
+                            room.closed ? "" : "at least ", room.area_m2, room.perimeter_m(),
+                            room.height_m > 0.0 ? fmt::format("{:.2f} m ({:.2f} to {:.2f})", room.height_m,
+                                                              room.heights_m[0], room.heights_m[1])
+                                                : "not seen");
+    text.at = low + Eigen::Vector2d(0.5 + 0.35 * kPlanText_m * static_cast<double>(text.text.size()),
+                                    -kLine_m * static_cast<double>(i + 1));
     drawing.texts.push_back(text);
   }
 }
@@ -131,26 +152,38 @@ void draw_grid(std::size_t layer, std::size_t bar_layer, Drawing& drawing) {
       {bar_layer, {from.x() + bar_m + 0.4, y + 0.05}, kPlanText_m, 0.0, fmt::format("{:g} m", bar_m)});
 }
 
+/// Notes on what the plan holds.
+std::vector<std::string> notes_of(const WallPlan& plan) {
+  std::size_t gaps = 0;
+  for (const WallLine& wall : plan.walls) gaps += wall.gaps.size();
+  const auto closed =
+      std::count_if(plan.rooms.begin(), plan.rooms.end(), [](const WallRoom& r) { return r.closed; });
+  const auto open = static_cast<std::ptrdiff_t>(plan.rooms.size()) - closed;
+  std::vector<std::string> notes{
+      fmt::format("{} walls, {} doors{}, {} closed rooms{}", plan.walls.size(), plan.doors.size(),
+                  gaps > 0 ? fmt::format(", {} windows or gaps at the cut", gaps) : "", closed,
+                  open > 0 ? fmt::format(", {} seen in part", open) : "")};
+  if (!plan.rays_known)
+    notes.emplace_back(
+        "without map.db it is not known what cameras saw through: only doors below a lintel are found");
+  return notes;
+}
+
 core::Result<Drawing> plan_drawing(MapSource& source, ExportSummary& summary) {
   const auto plan = find_walls(source);
   if (!plan) return tl::unexpected(plan.error());
   Drawing drawing;
   const PlanLayers layers(drawing);
+  for (const auto& outline : plan->furniture)
+    drawing.lines.push_back({layers.furniture, outline, true, false});
   draw_walls(*plan, layers, drawing);
   draw_doors(*plan, layers, drawing);
   draw_rooms(*plan, layers, drawing);
   draw_path(source, layers.path, drawing);
   draw_grid(layers.grid, layers.dimensions, drawing);
+  draw_room_table(*plan, layers, drawing);
   drawing.title = fmt::format("{}: plan at {:g} m", source.name(), source.options().cut_m);
-  std::size_t gaps = 0;
-  for (const WallLine& wall : plan->walls) gaps += wall.gaps.size();
-  summary.notes.push_back(
-      fmt::format("{} walls, {} doors{}, {} closed rooms", plan->walls.size(), plan->doors.size(),
-                  gaps > 0 ? fmt::format(", {} windows or gaps at the cut", gaps) : "", plan->rooms.size()));
-  if (!plan->rays_known) {
-    summary.notes.emplace_back(
-        "without map.db it is not known what cameras saw through: only doors below a lintel are found");
-  }
+  summary.notes = notes_of(*plan);
   return drawing;
 }
 
@@ -211,6 +244,20 @@ core::Result<Drawing> section_drawing(MapSource& source, ExportSummary& summary)
   return drawing;
 }
 
+core::Result<ExportSummary> write_plan_json(MapSource& source, const std::filesystem::path& output) {
+  if (!source.options().section.empty())
+    return core::usage_error("--section: is a drawing; write .svg, .pdf or .dxf");
+  const auto plan = find_walls(source);
+  if (!plan) return tl::unexpected(plan.error());
+  ExportSummary summary;
+  summary.notes = notes_of(*plan);
+  summary.written = {output};
+  const auto written = core::write_file(
+      output, plan_json(*plan, source.frame_text(), source.floor_m(), source.options().cut_m));
+  if (!written) return tl::unexpected(written.error());
+  return summary;
+}
+
 core::Result<ExportSummary> write_plan(MapSource& source, const std::filesystem::path& output) {
   const auto reference = georeference_of(source.options(), source.log());
   if (!reference) return tl::unexpected(reference.error());
@@ -225,6 +272,7 @@ core::Result<ExportSummary> write_plan(MapSource& source, const std::filesystem:
   }
 
   ExportSummary summary;
+  if (ending == ".json") return write_plan_json(source, output);
   auto drawing = section ? section_drawing(source, summary) : plan_drawing(source, summary);
   if (!drawing) return tl::unexpected(drawing.error());
 
@@ -251,10 +299,26 @@ core::Result<ExportSummary> write_plan(MapSource& source, const std::filesystem:
 
 }  // namespace
 
+std::vector<std::pair<double, double>> solid_pieces(const WallLine& wall) {
+  std::vector<WallOpening> openings = wall.openings;
+  openings.insert(openings.end(), wall.gaps.begin(), wall.gaps.end());
+  std::sort(openings.begin(), openings.end(),
+            [](const WallOpening& a, const WallOpening& b) { return a.s0 < b.s0; });
+
+  std::vector<std::pair<double, double>> pieces;
+  double from = wall.s0;
+  for (const WallOpening& opening : openings) {
+    if (opening.s0 > from) pieces.emplace_back(from, opening.s0);
+    from = std::max(from, opening.s1);
+  }
+  if (wall.s1 > from) pieces.emplace_back(from, wall.s1);
+  return pieces;
+}
+
 Format plan_format() {
   return {
       "plan",
-      {".svg", ".pdf", ".dxf"},
+      {".svg", ".pdf", ".dxf", "plan.json"},
       {Content::kCloud},
       "",
       "Floor plan or section for architects",
@@ -263,12 +327,19 @@ Format plan_format() {
       "over is left out: a half-height wall of which both faces were seen is drawn where it is higher than "
       "the cut. Where the cut passes through a window, or over a lower part, the wall is open, with a thin "
       "line: cameras looked through, or a hole over a level sill lies between wall, and nothing at the wall "
-      "hides it, as at a pane (or a dark screen on the wall). Furniture is left out. Doors are where cameras "
+      "hides it, as at a pane (or a dark screen on the wall). Furniture is a thin outline of what was seen "
+      "0.15 to 1.8 m over the floor. Doors are where cameras "
       "looked through a "
       "wall (without `map.db`: what lies "
-      "below a lintel); closed doors are wall. Walls over 1 m have their length, closed rooms their area; "
-      "a grid of metres, a scale bar, the paths. SVG and PDF are in a round scale, which is written in the "
-      "file; DXF (R2000) is in metres with the layers grid, rooms, path, walls, windows, doors, dimensions. "
+      "below a lintel); closed doors are wall. Walls over 1 m have their length, rooms number and area; "
+      "a table lists perimeter and height. Rooms close over doors and over gaps that the wall's other side, "
+      "the end of "
+      "a wall or less than 0.6 m explain, dashed; a room that was seen in part has a dashed limit and \"at "
+      "least\" "
+      "([plans.md](../method/plans.md)). `plan.json` holds rooms, openings and walls as numbers; a grid of "
+      "metres, a scale bar, the paths. SVG and PDF are in a round scale, which is written in the "
+      "file; DXF (R2000) is in metres with the layers grid, furniture, rooms, path, walls, windows, doors, "
+      "dimensions. "
       "Texts are read from below or from the right, also after `--datum`. `--section x,y,x,y` draws a "
       "vertical cut along that line instead.",
       {"cut", "section", "voxel", "datum", "epsg", "origin"},

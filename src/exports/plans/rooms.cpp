@@ -4,7 +4,7 @@
 #include <cmath>
 #include <set>
 
-#include "plans/walls.hpp"
+#include "plans/room_cells.hpp"
 
 namespace plumbline::exports {
 namespace {
@@ -14,27 +14,6 @@ struct Loop {
   double area_m2 = 0.0;  ///< positive: counter-clockwise
   bool inwards = false;  ///< its walls are seen from inside
 };
-
-double area_of(const std::vector<Eigen::Vector2d>& outline) {
-  double twice = 0.0;
-  for (std::size_t i = 0; i < outline.size(); ++i) {
-    const Eigen::Vector2d& a = outline[i];
-    const Eigen::Vector2d& b = outline[(i + 1) % outline.size()];
-    twice += a.x() * b.y() - a.y() * b.x();
-  }
-  return 0.5 * twice;
-}
-
-bool inside(const std::vector<Eigen::Vector2d>& outline, const Eigen::Vector2d& place) {
-  bool in = false;
-  for (std::size_t i = 0; i < outline.size(); ++i) {
-    const Eigen::Vector2d& a = outline[i];
-    const Eigen::Vector2d& b = outline[(i + 1) % outline.size()];
-    if ((a.y() > place.y()) == (b.y() > place.y())) continue;
-    if (place.x() < a.x() + (place.y() - a.y()) / (b.y() - a.y()) * (b.x() - a.x())) in = !in;
-  }
-  return in;
-}
 
 /// From one end of a wall to the other, round the corner, until the first wall comes again; empty: it never
 /// does.
@@ -87,7 +66,7 @@ Eigen::Vector2d label_place(const std::vector<Eigen::Vector2d>& outline, const s
 
     add(outline);
     for (const Loop& loop : loops) {
-      if (!loop.inwards && inside(outline, loop.outline.front())) add(loop.outline);
+      if (!loop.inwards && is_inside(outline, loop.outline.front())) add(loop.outline);
     }
 
     std::sort(crossings.begin(), crossings.end());
@@ -130,9 +109,11 @@ std::vector<WallRoom> rooms_of(const std::vector<WallLine>& walls) {
 
   for (const Loop& loop : loops) {
     if (!loop.inwards || loop.area_m2 < kSmallest_m2) continue;
-    WallRoom room{loop.outline, loop.area_m2, {}};
+    WallRoom room;
+    room.outline = loop.outline;
+    room.area_m2 = loop.area_m2;
     for (const Loop& hole : loops) {
-      if (!hole.inwards && hole.area_m2 < loop.area_m2 && inside(loop.outline, hole.outline.front()))
+      if (!hole.inwards && hole.area_m2 < loop.area_m2 && is_inside(loop.outline, hole.outline.front()))
         room.area_m2 -= hole.area_m2;
     }
     room.label = label_place(loop.outline, loops);

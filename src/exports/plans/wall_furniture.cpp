@@ -84,6 +84,18 @@ bool are_faces(const WallLine& a, const WallLine& b) {
   return std::min(a.s1, last) - std::max(a.s0, first) > kShare * std::max(a.length(), b.length());
 }
 
+/// True if a short side is neither parallel nor square to any long one: a curtain, or a leaf that is ajar.
+bool is_askew(const WallLine& side, const std::vector<WallLine>& walls) {
+  constexpr double kShort_m = 0.6;
+  constexpr double kLong_m = 1.5;
+  constexpr double kTurn = 0.07;  // sine of 4 degrees
+  return side.length() < kShort_m && std::none_of(walls.begin(), walls.end(), [&](const WallLine& other) {
+           const double parallel = std::abs(side.normal.dot(other.normal));
+           const double square = std::abs(side.normal.dot(other.along()));
+           return other.length() >= kLong_m && std::min(parallel, square) < kTurn;
+         });
+}
+
 }  // namespace
 
 void drop_low_furniture(std::vector<WallLine>& walls) {
@@ -119,6 +131,7 @@ void drop_loose_sides(std::vector<WallLine>& walls, std::vector<WallRaster>& ras
 
   keep_sides(walls, rasters, [&](std::size_t i) {
     if (walls[i].length() >= kShort_m) return true;
+    if (is_askew(walls[i], walls)) return false;
 
     const bool met = joined[i].corner[0] >= 0 && joined[i].corner[1] >= 0;
     if (met && walls[i].length() >= kStub_m) return true;

@@ -60,4 +60,12 @@ std::vector<WallDoor> doors_of(std::vector<WallLine>& walls);
 std::vector<WallDoor> doors_between_sides(const std::vector<WallLine>& walls,
                                           const std::vector<Fronts>& fronts, const Cut& cut);
 
+/// Gives doors of which one side was seen the face of a wall behind them as their other side.
+void find_far_sides(const std::vector<WallLine>& walls, std::vector<WallDoor>& doors);
+/// Openings between the free end of a wall and the wall that its line meets next, which are the rest of it.
+std::vector<WallDoor> doors_at_free_ends(const std::vector<WallLine>& walls,
+                                         const std::vector<WallDoor>& doors);
+/// The line from the one jamb to the other, as a wall.
+WallLine closing_of(const WallDoor& door);
+
 }  // namespace plumbline::exports

@@ -10,6 +10,7 @@
 #include <limits>
 #include <utility>
 
+#include "plans/room_cells.hpp"
 #include "plans/wall_steps.hpp"
 
 namespace plumbline::exports {
@@ -54,6 +55,17 @@ core::Error no_wall_error(const MapSource& source, const cloud::CloudFile& file)
               beside && source.options().storey < 0 ? "find the floor with --storey 0, or " : "")};
 }
 
+/// The plan's part of the map, with room for what lies beside the walls.
+Eigen::AlignedBox2d box_of(const std::vector<WallLine>& walls) {
+  Eigen::AlignedBox2d box;
+  for (const WallLine& wall : walls) {
+    box.extend(wall.at(wall.s0));
+    box.extend(wall.at(wall.s1));
+  }
+  const Eigen::Vector2d margin = Eigen::Vector2d::Constant(4.0);  // cameras may be beyond
+  return {box.min() - margin, box.max() + margin};
+}
+
 /// Moves what was found in a cloud less its shift to where it is.
 void move_plan(const Eigen::Vector2d& shift, WallPlan& plan) {
   for (WallLine& wall : plan.walls) {
@@ -69,9 +81,53 @@ void move_plan(const Eigen::Vector2d& shift, WallPlan& plan) {
     for (Eigen::Vector2d& jamb : door.jambs) jamb += shift;
     for (Eigen::Vector2d& jamb : door.far_jambs) jamb += shift;
   }
+  for (auto& outline : plan.furniture) {
+    for (Eigen::Vector2d& corner : outline) corner += shift;
+  }
   for (WallRoom& room : plan.rooms) {
     for (Eigen::Vector2d& corner : room.outline) corner += shift;
     room.label += shift;
+  }
+}
+
+/// Adds openings at free ends of walls whose jambs were both seen, and gives the lines that close the others.
+std::vector<WallLine> close_free_ends(const cloud::Cloud& cloud, double floor_m, WallPlan& plan) {
+  constexpr double kSame_m = 0.3;
+  std::vector<WallDoor> at_ends = doors_at_free_ends(plan.walls, plan.doors);
+  find_far_sides(plan.walls, at_ends);
+  std::vector<WallLine> closings;
+  for (const WallDoor& door : at_ends) {
+    std::vector<WallDoor> measured{door};
+    measure_doors(cloud, floor_m, measured);
+    const WallDoor& m = measured.front();
+    const bool again = std::any_of(plan.doors.begin(), plan.doors.end(), [&](const WallDoor& other) {
+      return (other.jambs[0] + other.jambs[1] - m.jambs[0] - m.jambs[1]).norm() <
+             2.0 * (kSame_m + other.depth_m());
+    });
+    if (!again && m.jamb_seen[0] && m.jamb_seen[1] && m.width_m > kNarrowestDoor_m) {
+      plan.doors.push_back(m);
+    } else {
+      closings.push_back(closing_of(door));
+    }
+  }
+  return closings;
+}
+
+/// Thickness of walls of which both faces were seen.
+void set_thickness(std::vector<WallLine>& walls) {
+  constexpr double kLeastCommon_m = 0.3;
+  for (WallLine& wall : walls) {
+    double nearest = kThickestWall_m;
+    for (const WallLine& other : walls) {
+      const double behind = wall.offset_m - wall.normal.dot(other.at(0.5 * (other.s0 + other.s1)));
+      const double first = wall.along().dot(other.at(other.s1)), last = wall.along().dot(other.at(other.s0));
+      const double common = std::min(wall.s1, last) - std::max(wall.s0, first);
+      if (wall.normal.dot(other.normal) > -0.99 || behind < 0.02 || behind > nearest ||
+          common < kLeastCommon_m)
+        continue;
+      nearest = behind;
+      wall.thickness_m = behind;
+    }
   }
 }
 
@@ -96,8 +152,10 @@ core::Result<WallPlan> find_walls(MapSource& source) {
   plan.walls = wall_sides(points, floor_m, cut_m, source.executor());
   drop_low_furniture(plan.walls);
   std::vector<WallRaster> rasters = rasters_of(plan.walls, points, floor_m);
+  FreeSpace space(box_of(plan.walls), floor_m);
   if (source.has_store()) {
     auto seen = for_each_view(source, [&](const ViewRays& rays) -> core::Result<void> {
+      space.add(rays);
       source.executor().parallel_for(rasters.size(), [&](std::size_t i) { rasters[i].add_rays(rays); });
       return {};
     });
@@ -138,7 +196,17 @@ core::Result<WallPlan> find_walls(MapSource& source) {
   plan.doors = doors_of(plan.walls);
   const std::vector<WallDoor> more = doors_between_sides(plan.walls, fronts, cut);
   plan.doors.insert(plan.doors.end(), more.begin(), more.end());
-  plan.rooms = rooms_of(plan.walls);
+  find_far_sides(plan.walls, plan.doors);
+  measure_doors(points, floor_m, plan.doors);
+  if (plan.rays_known) {
+    const std::vector<WallLine> closings = close_free_ends(points, floor_m, plan);
+    plan.rooms = rooms_in(box_of(plan.walls), plan.walls, closings, plan.doors, space);
+  } else {
+    plan.rooms = rooms_of(plan.walls);
+  }
+  set_thickness(plan.walls);
+  plan.furniture = furniture_outlines(points, floor_m, plan.walls);
+  measure_heights(points, floor_m, plan.rooms);
   move_plan((*cloud)->shift.head<2>(), plan);
   return plan;
 }

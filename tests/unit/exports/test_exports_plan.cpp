@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "exports/export_test.hpp"
+#include "plans/room_cells.hpp"
 
 namespace plumbline::exports {
 namespace {
@@ -185,6 +186,58 @@ TEST_F(ExportPlan, WithoutWallsItSaysSo) {
   const auto nothing = write(wanted);
   ASSERT_FALSE(nothing);
   EXPECT_NE(nothing.error().message.find("no wall"), std::string::npos) << nothing.error().message;
+}
+
+TEST_F(ExportPlan, JsonHoldsWhatIsDrawn) {
+  ASSERT_TRUE(write(request("plan.json")));
+  const std::string json = bytes("plan.json");
+  EXPECT_NE(json.find("\"area_m2\": 12.0"), std::string::npos) << json.substr(0, 400);
+  EXPECT_EQ(count(json, "\"closed\": true"), 2U);
+  EXPECT_EQ(count(json, "\"kind\": \"door\""), 1U);
+  EXPECT_EQ(count(json, "\"thickness_m\": 0.12"), 4U) << "two pieces on each side of the wall with the door";
+}
+
+/// A face of a wall, its front on the right of the way.
+WallLine face(const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
+  const Eigen::Vector2d along = (to - from).normalized();
+  WallLine wall;
+  wall.normal = {along.y(), -along.x()};
+  wall.offset_m = wall.normal.dot(from);
+  wall.s0 = along.dot(from);
+  wall.s1 = along.dot(to);
+  return wall;
+}
+
+/// The room of 4 x 3 m whose wall at x = 4 is seen from y = 0 up to a height, looked through from its middle.
+std::vector<WallRoom> room_seen_up_to(double y) {
+  const std::vector<WallLine> walls = {face({0, 0}, {0, 3}), face({0, 3}, {4, 3}), face({4, y}, {4, 0}),
+                                       face({4, 0}, {0, 0})};
+  const Eigen::AlignedBox2d box(Eigen::Vector2d(-1.5, -1.5), Eigen::Vector2d(5.5, 4.5));
+  FreeSpace space(box, 0.0);
+  for (int view = 0; view < 3; ++view) {
+    ViewRays rays;
+    rays.origin = {1.9 + 0.1 * view, 1.5, 1.4};
+    for (int k = 0; k < 720; ++k) {
+      const Eigen::Vector2d way(std::cos(k * M_PI / 360.0), std::sin(k * M_PI / 360.0));
+      const double x = (way.x() > 0 ? 4.0 - rays.origin.x() : -rays.origin.x()) / way.x();
+      const double far = std::min(x, (way.y() > 0 ? 1.5 : -1.5) / way.y());
+      rays.ends.emplace_back((rays.origin + far * Eigen::Vector3d(way.x(), way.y(), 0)).cast<float>());
+    }
+    space.add(rays);
+  }
+  return rooms_in(box, walls, {}, {}, space);
+}
+
+TEST(PlanRooms, CloseOverShortGapsOnly) {
+  for (const double y : {3.0, 2.5, 1.5}) {
+    const std::vector<WallRoom> rooms = room_seen_up_to(y);
+    ASSERT_EQ(rooms.size(), 1U) << y;
+    EXPECT_NEAR(rooms[0].area_m2, 12.0, 0.01) << y;
+    EXPECT_NEAR(rooms[0].perimeter_m(), 14.0, 0.01) << y;
+    EXPECT_EQ(rooms[0].closed, y > 2.0) << y;
+    const auto gaps = std::count(rooms[0].sides.begin(), rooms[0].sides.end(), RoomSide::kGap);
+    EXPECT_EQ(gaps, y == 2.5 ? 1 : 0) << y;
+  }
 }
 
 }  // namespace
