@@ -5,7 +5,7 @@
 usage: trust_worlds.py PROGRAM WORK [DATA]    DATA: a folder of recordings with groundtruth.txt; WORK keeps everything
 
 The list of bases is frozen; even ones tune, odd ones test. Needs nothing but Python 3. Prints Markdown tables.
-Environment: ONLY=tuning|test; AGAIN=1 checks the kept results again.
+Environment: ONLY=tuning|test; WORLDS=N: the first ones; AGAIN=1 checks the kept results again.
 """
 import json, math, os, random, shutil, subprocess, sys
 
@@ -26,7 +26,7 @@ STARTS = [0, 0.2, 0.4, 0.6, 0.8]
 
 
 def worlds():
-    for i in range(42):
+    for i in range(int(os.environ.get('WORLDS', 42))):
         scene, sensor = SCENES[i % 5], SENSORS[i % 7]
         options = f'--seed {300 + i} --sensor {sensor} --fps {FPS} --frames {FRAMES} --width 320 --height 240'
         if scene != 'room': options += f' --layout {300 + i} --path {"wander" if i % 4 == 3 else "tour"}'
@@ -78,12 +78,15 @@ def map_of(name, recording, how='', options=()):
     out = f'{WORK}/{name}.map'
     if not os.path.exists(f'{out}.json'):
         words = ['map', recording, '-o', out, '--force', '--set', 'output.views=', '--set', 'output.pcd=off',
-                 '--set', 'store.enabled=off', '--set', 'check.enabled=off', *options]
+                 '--set', 'check.enabled=off', *options]
         if how == 'held': words += ['--set', 'track.camera.refine=off']
-        if how in ('inverted', 'opengl', 'given'):
+        if how not in ('inverted', 'opengl', 'given'):
+            words += ['--set', 'store.enabled=off']
+        else:
             write(f'{out}.given', changed_poses(poses(f'{recording}/groundtruth.txt'), how))
             words += ['-p', 'known_poses', '--set', f'poses.file={out}.given']
         done = run(*words)
+        if done.returncode in (1, 2, 5): sys.exit(done.stderr)
         json.dump({'code': done.returncode, 'told': done.stderr[-500:]}, open(f'{out}.json', 'w'))
         for big in ('map.ply', 'map.db', 'lines.ply'):
             if os.path.exists(f'{out}/{big}'): os.remove(f'{out}/{big}')
@@ -164,7 +167,7 @@ def judged():
         checked = check(name, result, recording)
         if told['code'] == 4: checked['trusted'] = False
         checked['reasons'] = [summary['reason']] * bool(summary['reason']) + checked['reasons']
-        checked['told_m'] = checked.get('told_m', 0)
+        checked['parts'] = any(sign in summary['reason'] for sign in ('no place with the first', 'have no pose', 'can be seen in'))
         yield base, test, kind, error, length, checked
         if kind != 'right' or told['code'] or name.rpartition('@')[2][:3] in ('0.2', '0.4', '0.6', '0.8'): continue
         rows, rng = poses(f'{result}/trajectory.txt'), random.Random(name)
@@ -181,12 +184,15 @@ def quantiles(values):
 
 
 def label(kind, error, length, checked):
-    """Bad: ATE above 2 cm or 0.5 % of the path up to 10 cm; good: below half of that; given poses by their convention."""
+    """Bad: ATE above 2 cm or 0.5 % of the path up to 10 cm; good: below half of that; given poses by their convention;
+    parts: doubted because frames are lost or form a second map, which says nothing about accuracy."""
     if kind in ('poses inverted', 'poses opengl', 'depth x 10'): return 'bad'
     if kind in ('poses given, right', 'poses given'): return 'good'
     if error is None: return 'none'
+    if checked.get('parts'): return 'parts'
     limit = min(0.10, max(0.02, 0.005 * (length or 0)))
-    return 'bad' if error > limit else 'good' if error < 0.5 * limit else 'between'
+    spoilt_by_hand = kind in ('jump', 'drift', 'bend', 'away and back', 'wave')  # never right
+    return 'bad' if error > limit else 'good' if error < 0.5 * limit and not spoilt_by_hand else 'between'
 
 
 def main():
