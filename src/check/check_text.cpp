@@ -38,7 +38,7 @@ std::string shape_sentence(const std::optional<Shape>& shape, const std::vector<
   }
   const std::string rest = what.empty() ? "" : fmt::format("; {} unchecked{}", what, why);
   if (!shape) return fmt::format("No reason to doubt this result was found{}.", rest);
-  return fmt::format("Shape ± {} (95 %: {}), lengths {:.1f} %{}.", mm(shape->expected_m), mm(shape->p95_m),
+  return fmt::format("Shape ± {} (95 %: {}), lengths {:.2g} %{}.", mm(shape->expected_m), mm(shape->p95_m),
                      100.0 * shape->lengths, rest);
 }
 

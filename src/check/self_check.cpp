@@ -197,6 +197,9 @@ class Check {
   [[nodiscard]] CheckReport summed_up() const {
     CheckReport report;
     report.anchors = anchors_.size();
+    for (const Partners& partners : partners_) {
+      for (const auto& gap : partners.by_gap) report.tried += gap.size();
+    }
     report.noise = {noise_.a, noise_.b};
     report.told_m = input_.told_m;
     std::vector<double> distances;
@@ -339,6 +342,7 @@ class Check {
     constexpr double kContradicted_m = 0.02;
     constexpr double kNeighbours_s = 0.1;
     constexpr double kMostlyFound = 0.6;
+    constexpr double kContradicted_rad = 0.05;  // of what lies before the camera a shift is much like a turn
     constexpr std::size_t kAround = 15;
     if (speeds[i] > kFastest_m_s) return true;
     const std::size_t begin = i > kAround ? i - kAround : 0, end = std::min(speeds.size(), i + kAround + 1);
@@ -350,7 +354,8 @@ class Check {
       const KeptFrame& a = frames_[anchors_[pair.first]].frame;
       const KeptFrame& b = frames_[anchors_[pair.second]].frame;
       if (a.way != way || a.stamp > from + 1e-6 || b.stamp < to - 1e-6) continue;
-      return pair.contradicts || pair.both.shift_m() > kContradicted_m || pair.found < kMostlyFound;
+      return pair.contradicts || pair.found < kMostlyFound || pair.both.shift_m() > kContradicted_m ||
+             pair.both.motion.tail<3>().norm() > kContradicted_rad;
     }
     // After the last anchor nothing was aligned: that says nothing.
     const bool between = std::any_of(anchors_.begin(), anchors_.end(), [&](std::size_t a) {

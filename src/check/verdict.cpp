@@ -33,6 +33,7 @@ constexpr double kMostLimit_m = 0.09;
 constexpr double kMostRefused = 0.3;  ///< and one pair
 constexpr double kMostChi = 25.0;
 constexpr std::size_t kEnoughPairs = 4;
+constexpr std::size_t kEnoughTried = 6;  ///< of so many some shows a surface twice
 
 double squared(double value) { return value * value; }
 
@@ -79,6 +80,9 @@ void judge(CheckReport& report) {
   report.unchecked.emplace_back("scale");
   if (!report.checked()) {
     report.unchecked.emplace_back("shape: no two frames show the same surface");
+    if (report.tried >= kEnoughTried)
+      report.reasons.emplace_back(
+          "no two frames show the same surface, such as where all depth is beyond the range");
     return;
   }
   if (report.align[kRevisit].pairs == 0) report.unchecked.emplace_back("drift: nothing was seen twice");

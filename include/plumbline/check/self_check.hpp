@@ -63,7 +63,8 @@ struct BadPlace {
 
 struct CheckReport {
   std::size_t anchors = 0;  ///< frames that pairs begin with
-  std::size_t pairs = 0;
+  std::size_t tried = 0;    ///< pairs of frames that should show the same surface
+  std::size_t pairs = 0;    ///< those that could be aligned, or contradict the path
   std::array<GapReport, kGaps> align;
   double graph_m = 0.0;         ///< RMS of the shifts that all corrections together ask for, after SE(3)
   double refused = 0.0;         ///< share of pairs that contradict all others, or show no common surface

@@ -106,7 +106,7 @@ TEST_F(Checks, EndOfMap) {
 
 TEST_F(Checks, FramesThatShowNothingAreNotLost) {
   ASSERT_EQ(run("synth room -o dark --frames 90 --fps 15 --width 320 --height 240 --reference-spacing 20cm "
-                "--seed 3 --events cover@2+1.5 -q")
+                "--seed 3 --events cover@4.4+1.6 -q")
                 .code,
             0);
   const Outcome mapped = run("map dark/robot0 -o out --set output.views=");
