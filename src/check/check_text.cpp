@@ -28,11 +28,24 @@ std::string mm(double metres) { return fmt::format("{:.{}f} mm", 1000.0 * metres
 
 }  // namespace
 
+std::string shape_sentence(const std::optional<Shape>& shape, const std::vector<std::string>& unchecked) {
+  // "drift: nothing was seen twice" is what, and why.
+  std::string what, why;
+  for (const std::string& one : unchecked) {
+    const std::size_t colon = one.find(": ");
+    what += (what.empty() ? "" : ", ") + one.substr(0, colon);
+    if (colon != std::string::npos) why += (why.empty() ? ": " : "; ") + one.substr(colon + 2);
+  }
+  const std::string rest = what.empty() ? "" : fmt::format("; {} unchecked{}", what, why);
+  if (!shape) return fmt::format("No reason to doubt this result was found{}.", rest);
+  return fmt::format("Shape ± {} (95 %: {}), lengths {:.2g} %{}.", mm(shape->expected_m), mm(shape->p95_m),
+                     100.0 * shape->lengths, rest);
+}
+
 std::string sentence(const CheckReport& report) {
   if (!report.reasons.empty()) return fmt::format("Not trustworthy: {}.", fmt::join(report.reasons, "; "));
-  if (!report.checked()) return "Nothing was checked: no two frames show the same surface.";
-  return fmt::format("Shape ± {} (95 %: {}); unchecked: {}.", mm(report.expected_m), mm(report.p95_m),
-                     fmt::join(report.unchecked, "; "));
+  if (!report.checked()) return shape_sentence({}, report.unchecked);
+  return shape_sentence(Shape{report.expected_m, report.p95_m, report.lengths}, report.unchecked);
 }
 
 std::string to_text(const CheckReport& report) {
@@ -71,15 +84,20 @@ std::string to_json(const CheckReport& report) {
   Json align = Json::object();
   for (std::size_t gap = 0; gap < kGaps; ++gap) {
     const GapReport& one = report.align[gap];
-    align[kNames[gap]] = {
-        {"pairs", one.pairs}, {"median_m", rounded_m(one.median_m)}, {"p90_m", rounded_m(one.p90_m)}};
+    align[kNames[gap]] = {{"pairs", one.pairs},
+                          {"median_m", rounded_m(one.median_m)},
+                          {"p90_m", rounded_m(one.p90_m)},
+                          {"unexplained_m", rounded_m(one.unexplained_m)}};
   }
   Json tears = Json::array();
   for (const BadPlace& tear : report.tears) tears.push_back(json_of(tear));
+  Json along = Json::array();
+  for (const BadPlace& place : report.along) along.push_back(json_of(place));
 
   const Json all = {{"sentence", sentence(report)},
                     {"expected_m", rounded_m(report.expected_m)},
                     {"p95_m", rounded_m(report.p95_m)},
+                    {"lengths", std::round(report.lengths * 1e5) / 1e5},
                     {"trusted", report.reasons.empty()},
                     {"reasons", report.reasons},
                     {"unchecked", report.unchecked},
@@ -92,9 +110,11 @@ std::string to_json(const CheckReport& report) {
                     {"split_chi", std::round(report.split_chi * 1e3) / 1e3},
                     {"local", report.local.off_m > 0.0 ? json_of(report.local) : Json(nullptr)},
                     {"tears", tears},
+                    {"along", along},
                     {"noise", {{"a_m", rounded_m(report.noise[0])}, {"b_per_m", rounded_m(report.noise[1])}}},
                     {"distance_m", rounded_m(report.distance_m)},
                     {"path_m", rounded_m(report.path_m)},
+                    {"size_m", rounded_m(report.size_m)},
                     {"anchors", report.anchors},
                     {"pairs", report.pairs}};
   return core::json_text(all);

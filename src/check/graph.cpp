@@ -49,8 +49,8 @@ class Equations {
     // No correction is better than the best ones are.
     for (const PairLink& link : links) {
       const Matrix6d own = (link.correction.information + Matrix6d::Identity() * 1e-3).inverse();
-      trust_.push_back(
-          (own + diagonal(kBestShift_m * kBestShift_m, kBestTurn_rad * kBestTurn_rad)).inverse());
+      const Matrix6d best = diagonal(kBestShift_m * kBestShift_m, kBestTurn_rad * kBestTurn_rad);
+      trust_.push_back((own + best + link.correction.blur.covariance()).inverse());
     }
   }
 

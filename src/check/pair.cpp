@@ -77,6 +77,31 @@ double Correction::shift_m() const {
   return std::sqrt(std::max(0.0, motion.head<3>().squaredNorm() - own));
 }
 
+double Correction::unexplained_m() const {
+  const double shift = shift_m();
+  return std::sqrt(std::max(0.0, shift * shift - 3.0 * blur.shift_m * blur.shift_m));
+}
+
+Matrix6d Blur::covariance() const {
+  Vector6d diagonal;
+  diagonal << Eigen::Vector3d::Constant(shift_m * shift_m), Eigen::Vector3d::Constant(turn_rad * turn_rad);
+  return diagonal.asDiagonal();
+}
+
+Blur blur_of(const FramePoses& first, const FramePoses& second, double distance_m) {
+  constexpr double kTime_s = 0.010;
+  const double share = kTime_s / std::sqrt(3.0);
+  const double turn = share * std::hypot(first.turn.norm(), second.turn.norm());
+  return {std::hypot(share * std::hypot(first.velocity.norm(), second.velocity.norm()), distance_m * turn),
+          turn};
+}
+
+double PairRows::distance_m() const {
+  double sum = 0.0;
+  for (const DepthRow& row : depth) sum += row.point.z();
+  return depth.empty() ? 0.0 : sum / static_cast<double>(depth.size());
+}
+
 FirstView::FirstView(View view) : view_(std::move(view)) {
   const cv::Size& size = view_.camera->size();
   for (int y = kSampleStep / 2; y < size.height; y += kSampleStep) {
@@ -111,6 +136,8 @@ PairRows FirstView::depth_rows(const View& second) const {
   rows.meet = rows.depth.size() >= kFewest &&
               static_cast<double>(rows.depth.size()) > kLeastShare * static_cast<double>(samples_.size());
 
+  if (rows.common > 0) rows.found = static_cast<double>(rows.depth.size()) / static_cast<double>(rows.common);
+
   // Evenly spread ones are enough.
   if (rows.depth.size() > kMostRows) {
     const std::size_t all = rows.depth.size();
@@ -125,6 +152,7 @@ PairRows FirstView::depth_rows(const View& second) const {
 Correction correction_of(const PairRows& rows, const sensor::Pinhole& second, const DepthNoise& noise,
                          Rows use) {
   constexpr int kRounds = 5;
+  constexpr int kFirstRounds = 3;
   constexpr double kHuber = 1.5;
   constexpr double kFarthest = 60.0;
   const std::vector<Equation> all = equations(rows, second, noise, use);
@@ -137,7 +165,7 @@ Correction correction_of(const PairRows& rows, const sensor::Pinhole& second, co
 
     for (const Equation& e : all) {
       const double off = std::abs(e.value - e.row.dot(found.motion));
-      if (off > kFarthest) continue;
+      if (round >= kFirstRounds && off > kFarthest) continue;  // at first a jump takes all rows far away
       const double weight = kHuber / std::max(kHuber, off);
       information.noalias() += e.row * (weight * e.row.transpose());
       right.noalias() += weight * e.value * e.row;

@@ -38,12 +38,16 @@ struct PairRows {
   std::vector<FlowRow> flow;
   std::size_t common = 0;   ///< surface points that fall on a surface of the second picture
   std::size_t through = 0;  ///< those that the second frame looks through
+  double found = 1.0;       ///< share of `common` that lies near enough to be compared
   bool meet = false;        ///< so much surface is common that it holds all directions
   /// True if the frames should show the same surface, and do not. Between visits something else may have
   /// come before it, but nobody looks through it.
   [[nodiscard]] bool contradicts(bool revisit) const {
     return common >= kMany && (revisit ? 2 * through > common : 4 * depth.size() < common);
   }
+
+  /// Mean depth of the common surface.
+  [[nodiscard]] double distance_m() const;
 
   static constexpr std::size_t kMany = 600;
 };
@@ -69,14 +73,27 @@ class FirstView {
   std::vector<cv::Point2f> corners_;
 };
 
+/// Distance that both cameras moved while the pictures were taken: a pair knows neither when each row was
+/// read nor how late depth is, to about 10 ms, and cannot tell such an error from one of the path. RMS a
+/// component.
+struct Blur {
+  double shift_m = 0.0;  ///< with that of surfaces at their distance, which a turn moves alike
+  double turn_rad = 0.0;
+  [[nodiscard]] geometry::Matrix6d covariance() const;
+};
+Blur blur_of(const FramePoses& first, const FramePoses& second, double distance_m);
+
 /// Small motion (t, w) of the first frame's points in the second camera that the rows ask for.
 struct Correction {
   geometry::Vector6d motion = geometry::Vector6d::Zero();
   geometry::Matrix6d information = geometry::Matrix6d::Zero();  ///< without the prior
+  Blur blur;
   /// With the prior of 0.3 m and 0.15 rad.
   [[nodiscard]] geometry::Matrix6d covariance() const;
   /// Length of the shift, less its own noise.
   [[nodiscard]] double shift_m() const;
+  /// The same, less what the cameras' motion explains: only this is a sign against the path.
+  [[nodiscard]] double unexplained_m() const;
 };
 
 enum class Rows { kBoth, kDepth, kFlow };

@@ -2,6 +2,7 @@
 #include "plumbline/check/self_check.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -20,6 +21,7 @@ namespace {
 struct AlignedPair {
   std::size_t first = 0;  ///< number of an anchor
   std::size_t second = 0;
+  double found = 1.0;        ///< share of the common surface that is near enough to be compared
   bool contradicts = false;  ///< no common surface where there should be one
   Correction both;
   double split_chi = -1.0;        ///< depth against colour; negative: one of them says nothing
@@ -29,7 +31,7 @@ struct AlignedPair {
 /// Depth against colour, in the directions that both know.
 void note_split(const Correction& depth, const Correction& flow, AlignedPair& pair) {
   const geometry::Vector6d off = depth.motion - flow.motion;
-  const geometry::Matrix6d noise = depth.covariance() + flow.covariance();
+  const geometry::Matrix6d noise = depth.covariance() + flow.covariance() + pair.both.blur.covariance();
   pair.split_chi = std::sqrt(off.dot(noise.ldlt().solve(off)) / 6.0);
   pair.split_squared_m2 = off.head<3>().squaredNorm() - noise.topLeftCorner<3, 3>().trace();
 }
@@ -91,8 +93,6 @@ class Check {
     for (std::size_t f = 0; f < frames_.size(); ++f) {
       if (frames_[f].frame.use == FrameChoice::Use::kAnchor) anchors_.push_back(f);
     }
-    if (frames_.empty())
-      return core::input_error("no frame of the recording has a pose: do the stamps belong together?");
 
     if (auto done = choose(); !done) return tl::unexpected(done.error());
     if (auto done = measure_noise(); !done) return tl::unexpected(done.error());
@@ -179,6 +179,7 @@ class Check {
                                                  std::size_t gap) const {
     AlignedPair pair;
     PairRows rows = first.depth_rows(second);
+    pair.found = rows.found;
     pair.contradicts = rows.contradicts(gap == kRevisit);
     if (pair.contradicts) return pair;
     if (!rows.meet) return std::nullopt;
@@ -186,6 +187,7 @@ class Check {
     first.add_flow(second, rows);
     const sensor::Pinhole& camera = second.camera->pinhole();
     pair.both = correction_of(rows, camera, noise_, Rows::kBoth);
+    pair.both.blur = blur_of(first.view().poses, second.poses, rows.distance_m());
     if (gap == kSecond && !rows.flow.empty())
       note_split(correction_of(rows, camera, noise_, Rows::kDepth),
                  correction_of(rows, camera, noise_, Rows::kFlow), pair);
@@ -195,6 +197,9 @@ class Check {
   [[nodiscard]] CheckReport summed_up() const {
     CheckReport report;
     report.anchors = anchors_.size();
+    for (const Partners& partners : partners_) {
+      for (const auto& gap : partners.by_gap) report.tried += gap.size();
+    }
     report.noise = {noise_.a, noise_.b};
     report.told_m = input_.told_m;
     std::vector<double> distances;
@@ -202,14 +207,20 @@ class Check {
     if (!distances.empty()) report.distance_m = core::median(std::move(distances));
 
     for (std::size_t gap = 0; gap < kGaps; ++gap) {
-      std::vector<double> shifts;
+      std::vector<double> shifts, unexplained;
       for (const AlignedPair& pair : pairs_[gap]) {
-        if (!pair.contradicts) shifts.push_back(pair.both.shift_m());
+        if (pair.contradicts) continue;
+        shifts.push_back(pair.both.shift_m());
+        unexplained.push_back(pair.both.unexplained_m());
       }
       report.align[gap] = {pairs_[gap].size(), core::quantile(shifts, 0.5, 0.0),
-                           core::quantile(shifts, 0.9, 0.0)};
+                           core::quantile(shifts, 0.9, 0.0), core::quantile(unexplained, 0.5, 0.0)};
       report.pairs += pairs_[gap].size();
     }
+
+    Eigen::AlignedBox3d box;
+    for (const std::size_t a : anchors_) box.extend(frames_[a].poses.world_from_depth.translation);
+    if (!anchors_.empty()) report.size_m = box.diagonal().norm() + 2.0 * report.distance_m;
 
     set_split(report);
     set_graph(report);
@@ -249,9 +260,23 @@ class Check {
     constexpr double kRefused = 0.3;
     const GraphReport graph = put_together(anchors, links);
     report.graph_m = graph.rms_m;
+    for (std::size_t a = 0; a < anchors_.size(); ++a)
+      report.along.push_back({graph.shift_m[a], anchors[a].stamp, anchors[a].way});
+    for (const auto& pairs : pairs_) {
+      for (const AlignedPair& pair : pairs) note_along(pair, report);
+    }
     for (const double weight : graph.weight) refused += weight < kRefused ? 1U : 0U;
     if (report.pairs > 0) report.refused = static_cast<double>(refused) / static_cast<double>(report.pairs);
   }
+
+  /// A pair's shift at both of its anchors.
+  void note_along(const AlignedPair& pair, CheckReport& report) const {
+    const double off_m = pair.contradicts ? contradiction_m(report) : pair.both.unexplained_m();
+    for (const std::size_t a : {pair.first, pair.second})
+      report.along[a].off_m = std::max(report.along[a].off_m, off_m);
+  }
+  /// Pairs that contradict the path are off by more than they look for surfaces.
+  static double contradiction_m(const CheckReport& report) { return 0.05 + 0.04 * report.distance_m; }
 
   /// Shift that the thirds of a second ask for together; none if one is missing.
   [[nodiscard]] std::optional<double> shift_by_thirds(const AlignedPair& second) const {
@@ -283,10 +308,10 @@ class Check {
     for (const AlignedPair& pair : pairs_[kSecond]) {
       if (pair.contradicts) continue;
       if (const auto thirds = shift_by_thirds(pair))
-        note(place(pair, std::min(pair.both.shift_m(), *thirds)));
+        note(place(pair, std::min(pair.both.unexplained_m(), *thirds)));
     }
     for (const AlignedPair& pair : pairs_[kThird]) {
-      if (pair.contradicts) note(place(pair, 0.05 + 0.04 * report.distance_m));
+      if (pair.contradicts) note(place(pair, contradiction_m(report)));
     }
     if (report.local.off_m <= least_local(report)) report.local = {};
   }
@@ -316,6 +341,8 @@ class Check {
     constexpr double kTimesMedian = 10.0;
     constexpr double kContradicted_m = 0.02;
     constexpr double kNeighbours_s = 0.1;
+    constexpr double kMostlyFound = 0.6;
+    constexpr double kContradicted_rad = 0.05;  // of what lies before the camera a shift is much like a turn
     constexpr std::size_t kAround = 15;
     if (speeds[i] > kFastest_m_s) return true;
     const std::size_t begin = i > kAround ? i - kAround : 0, end = std::min(speeds.size(), i + kAround + 1);
@@ -327,9 +354,14 @@ class Check {
       const KeptFrame& a = frames_[anchors_[pair.first]].frame;
       const KeptFrame& b = frames_[anchors_[pair.second]].frame;
       if (a.way != way || a.stamp > from + 1e-6 || b.stamp < to - 1e-6) continue;
-      return pair.contradicts || pair.both.shift_m() > kContradicted_m;
+      return pair.contradicts || pair.found < kMostlyFound || pair.both.shift_m() > kContradicted_m ||
+             pair.both.motion.tail<3>().norm() > kContradicted_rad;
     }
-    return to - from < kNeighbours_s;
+    // After the last anchor nothing was aligned: that says nothing.
+    const bool between = std::any_of(anchors_.begin(), anchors_.end(), [&](std::size_t a) {
+      return frames_[a].frame.way == way && frames_[a].frame.stamp > to - 1e-6;
+    });
+    return between && to - from < kNeighbours_s;
   }
 
   const CheckInput& input_;

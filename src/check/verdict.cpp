@@ -33,6 +33,7 @@ constexpr double kMostLimit_m = 0.09;
 constexpr double kMostRefused = 0.3;  ///< and one pair
 constexpr double kMostChi = 25.0;
 constexpr std::size_t kEnoughPairs = 4;
+constexpr std::size_t kEnoughTried = 6;  ///< of so many some shows a surface twice
 
 double squared(double value) { return value * value; }
 
@@ -42,24 +43,25 @@ double worst_tear(const CheckReport& report) {
   return worst;
 }
 
-/// Median of a gap that has enough pairs.
-double typical_m(const CheckReport& report, Gap gap) {
-  return report.align[gap].pairs >= kEnoughPairs ? report.align[gap].median_m : 0.0;
+/// Median of a gap that has enough pairs: of all that they are off, or of what their motion does not explain.
+using Median = double GapReport::*;
+double typical_m(const CheckReport& report, Gap gap, Median median = &GapReport::median_m) {
+  return report.align[gap].pairs >= kEnoughPairs ? report.align[gap].*median : 0.0;
 }
 
 /// Depth against colour and the shifts over three seconds add nothing to these.
-double expected_m(const CheckReport& r) {
-  return std::sqrt(squared(r.told_m) + squared(kGraph * r.graph_m) +
-                   squared(kRevisits * typical_m(r, kRevisit)) +
-                   squared(kLocal * std::max(r.local.off_m, worst_tear(r))) +
-                   squared(kThirds * r.align[kThird].median_m) + squared(kSeconds * typical_m(r, kSecond)));
+double expected_m(const CheckReport& r, Median median = &GapReport::median_m) {
+  return std::sqrt(
+      squared(r.told_m) + squared(kGraph * r.graph_m) + squared(kRevisits * typical_m(r, kRevisit, median)) +
+      squared(kLocal * std::max(r.local.off_m, worst_tear(r))) + squared(kThirds * r.align[kThird].*median) +
+      squared(kSeconds * typical_m(r, kSecond, median)));
 }
 
 /// "frames a second apart are 2.1 cm off each other", if that is beyond the limit.
 void doubt_gap(const CheckReport& report, Gap gap, const Limit& limit, const char* apart,
                std::vector<std::string>& reasons) {
   const GapReport& align = report.align[gap];
-  if (typical_m(report, gap) <= limit.at(report.distance_m)) return;
+  if (typical_m(report, gap, &GapReport::unexplained_m) <= limit.at(report.distance_m)) return;
   reasons.push_back(
       fmt::format("frames {} apart are {:.1f} cm off each other", apart, 100.0 * align.median_m));
 }
@@ -73,10 +75,14 @@ double least_local(const CheckReport& report) {
 void judge(CheckReport& report) {
   report.expected_m = expected_m(report);
   report.p95_m = kP95 * report.expected_m;
+  if (report.size_m > 0.0) report.lengths = std::sqrt(2.0) * report.expected_m / report.size_m;
 
   report.unchecked.emplace_back("scale");
   if (!report.checked()) {
     report.unchecked.emplace_back("shape: no two frames show the same surface");
+    if (report.tried >= kEnoughTried)
+      report.reasons.emplace_back(
+          "no two frames show the same surface, such as where all depth is beyond the range");
     return;
   }
   if (report.align[kRevisit].pairs == 0) report.unchecked.emplace_back("drift: nothing was seen twice");
@@ -109,7 +115,8 @@ void judge(CheckReport& report) {
     reasons.push_back(fmt::format("depth and colour ask for paths that are {:.1f} cm apart in a second",
                                   100.0 * report.split_m));
   }
-  if (report.expected_m > std::clamp(kMostOfPath * report.path_m, kLeastLimit_m, kMostLimit_m))
+  if (expected_m(report, &GapReport::unexplained_m) >
+      std::clamp(kMostOfPath * report.path_m, kLeastLimit_m, kMostLimit_m))
     reasons.push_back(fmt::format("the error to expect is {:.1f} cm", 100.0 * report.expected_m));
 }
 

@@ -51,6 +51,7 @@ struct GapReport {
   std::size_t pairs = 0;
   double median_m = 0.0;  ///< length of the shift, less its own noise
   double p90_m = 0.0;
+  double unexplained_m = 0.0;  ///< median, less what the cameras moved while the pictures were taken
 };
 
 /// A place of the path.
@@ -62,7 +63,8 @@ struct BadPlace {
 
 struct CheckReport {
   std::size_t anchors = 0;  ///< frames that pairs begin with
-  std::size_t pairs = 0;
+  std::size_t tried = 0;    ///< pairs of frames that should show the same surface
+  std::size_t pairs = 0;    ///< those that could be aligned, or contradict the path
   std::array<GapReport, kGaps> align;
   double graph_m = 0.0;         ///< RMS of the shifts that all corrections together ask for, after SE(3)
   double refused = 0.0;         ///< share of pairs that contradict all others, or show no common surface
@@ -70,13 +72,16 @@ struct CheckReport {
   double split_chi = 0.0;       ///< the same in standard deviations
   BadPlace local;               ///< where frames a second apart fit worst, if it stands out; off_m 0: nowhere
   std::vector<BadPlace> tears;  ///< steps that no camera makes, or that the pictures contradict
-  std::array<double, 2> noise{};       ///< of depth: a + b z^2, metres
-  double distance_m = 0.0;             ///< median depth
-  double path_m = 0.0;                 ///< length of all paths
-  double told_m = 0.0;                 ///< CheckInput::told_m
-  double expected_m = 0.0;             ///< expected RMS error of positions after SE(3)
-  double p95_m = 0.0;                  ///< 95 % of such results have a smaller error
-  std::vector<std::string> reasons;    ///< reasons not to trust the path; empty: there is none
+  std::vector<BadPlace> along;  ///< of each anchor: the shift that pairs around it and all together ask for
+  std::array<double, 2> noise{};     ///< of depth: a + b z^2, metres
+  double distance_m = 0.0;           ///< median depth
+  double path_m = 0.0;               ///< length of all paths
+  double size_m = 0.0;               ///< of what was recorded: the box around the anchors and twice the depth
+  double told_m = 0.0;               ///< CheckInput::told_m
+  double expected_m = 0.0;           ///< expected RMS error of positions after SE(3)
+  double p95_m = 0.0;                ///< 95 % of such results have a smaller error
+  double lengths = 0.0;              ///< expected relative error of distances, but for the scale
+  std::vector<std::string> reasons;  ///< reasons not to trust the path; empty: there is none
   std::vector<std::string> unchecked;  ///< what nothing here could see, one sentence part each
   [[nodiscard]] bool checked() const { return pairs > 0; }
 };
@@ -84,10 +89,20 @@ struct CheckReport {
 /// True if the path has a pose so near to the stamp.
 bool has_pose(const geometry::Trajectory& path, double stamp, double max_dt_s);
 
-/// Same result for any number of threads. Errors: those of CheckInput::read; kInput: no frame has a pose.
+/// Same result for any number of threads; nothing is checked of a path of fewer than two poses. Errors: those
+/// of CheckInput::read.
 core::Result<CheckReport> check_path(const CheckInput& input, const core::Executor& executor);
 
-/// "Shape +- 8 mm (95 %: 15 mm); scale unchecked." or "Not trustworthy: ...".
+/// Numbers that are told of a path that is trusted.
+struct Shape {
+  double expected_m = 0.0;
+  double p95_m = 0.0;
+  double lengths = 0.0;  ///< share by which distances within the recording may be off
+};
+/// "Shape +- 8 mm (95 %: 15 mm), lengths 0.4 %; scale unchecked."; without numbers: "No reason to doubt ...".
+/// `unchecked` are as CheckReport's.
+std::string shape_sentence(const std::optional<Shape>& shape, const std::vector<std::string>& unchecked);
+/// The same, or "Not trustworthy: ...".
 std::string sentence(const CheckReport& report);
 /// A table for people, several lines.
 std::string to_text(const CheckReport& report);

@@ -33,6 +33,7 @@ struct FrameRow {
   std::size_t frame = 0;  ///< number within the run
   std::string state;      ///< tracked, lost, initialising; unreadable is added by the writer
   std::string columns;    ///< the rest, comma-separated, as MapResult::frame_columns names it
+  bool blind = false;     ///< lost, and one of three or more in a row that show nothing
 };
 
 /// The tracker's decision about one frame.

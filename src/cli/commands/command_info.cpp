@@ -22,6 +22,7 @@
 #include "plumbline/maps/stored_run.hpp"
 #include "plumbline/net/ros2.hpp"
 #include "plumbline/pipeline/input.hpp"
+#include "plumbline/pipeline/verdict.hpp"
 #include "plumbline/synth/source.hpp"
 #include "result_page.hpp"
 #include "terminal/print.hpp"
@@ -71,6 +72,8 @@ core::Result<void> describe_result(const std::filesystem::path& folder, bool jso
   if (!summary) return core::input_error(summary.error().message + "; map again");
   if (!summary->is_object())
     return core::input_error(fmt::format("{}: holds no object of JSON; map again", file.string()));
+  if (const std::string sentence = pipeline::sentence_of(*summary); !json && !sentence.empty())
+    print("{}\n", sentence);
   print("{}", json ? core::json_text(*summary) : result_page(*summary));
   return {};
 }

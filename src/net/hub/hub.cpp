@@ -20,6 +20,7 @@
 #include "plumbline/core/text.hpp"
 #include "plumbline/maps/output_folder.hpp"
 #include "plumbline/maps/stored_maps.hpp"
+#include "plumbline/pipeline/verdict.hpp"
 
 namespace plumbline::net {
 namespace {
@@ -76,7 +77,8 @@ nlohmann::json json_of(const std::vector<RobotTraffic>& traffic) {
   return robots;
 }
 
-/// Adds the network's traffic, the meetings and the reason to the summary of the fusion.
+/// Adds the network's traffic, the meetings and what the network's part in them makes doubtful to the summary
+/// of the fusion.
 core::Result<void> add_network(const fs::path& file, const std::vector<RobotTraffic>& traffic,
                                const std::vector<pipeline::Meeting>& meetings, const std::string& reason) {
   auto read = core::read_json(file);
@@ -87,8 +89,7 @@ core::Result<void> add_network(const fs::path& file, const std::vector<RobotTraf
     summary["meetings"].push_back(
         {{"number", m.number}, {"a", m.a}, {"b", m.b}, {"log", m.frame}, {"taken_back", m.taken_back}});
   }
-  summary["trustworthy"] = reason.empty();
-  summary["reason"] = reason;
+  pipeline::add_to_verdict(reason, summary);
   return core::write_file(file, core::json_text(summary));
 }
 
@@ -168,8 +169,7 @@ core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, con
   if (!summary && leave_out_damaged(last.maps, executor, log, reason)) summary = fuse();
   if (!summary) return tl::unexpected(summary.error());
 
-  if (!summary->reason.empty()) reason = summary->reason + (reason.empty() ? "" : "; " + reason);
-  summary->reason = reason;
+  if (!reason.empty()) add_reason(reason, summary->reason);
   if (auto moved = move_all(last.output, folder); !moved) return tl::unexpected(moved.error());
   if (auto added = add_network(folder / "summary.json", collected.traffic, meetings.meetings(), reason);
       !added) {

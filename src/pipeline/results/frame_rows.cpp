@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "plumbline/core/output_file.hpp"
 
@@ -86,16 +87,38 @@ const std::array kColumns{
 
 }  // namespace
 
-std::string row_columns(const mapping::FrameReport& report) {
-  std::string row;
-  for (const Column& column : kColumns) row += (row.empty() ? "" : ",") + column.text(report);
-  return row;
+bool shows_nothing(const sensor::RgbdFrame& frame, std::size_t corners) {
+  constexpr int kStep = 8;
+  constexpr double kLeastDepth = 0.05;
+  constexpr double kLeastDeviation = 8.0;
+  constexpr std::size_t kFewCorners = 30;
+  double depth = 0.0, sum = 0.0, squares = 0.0, all = 0.0;
+  for (int y = kStep / 2; y < frame.gray.rows; y += kStep) {
+    for (int x = kStep / 2; x < frame.gray.cols; x += kStep) {
+      const double gray = frame.gray.at<std::uint8_t>(y, x);
+      depth += frame.depth.at<float>(y, x) > 0.0F ? 1.0 : 0.0;
+      sum += gray;
+      squares += gray * gray;
+      all += 1.0;
+    }
+  }
+  if (all == 0.0) return false;
+  const double deviation = std::sqrt(std::max(0.0, squares / all - sum / all * (sum / all)));
+  return depth < kLeastDepth * all || (deviation < kLeastDeviation && corners < kFewCorners);
 }
+
+std::string row_columns(const mapping::FrameReport& report, bool blind) {
+  std::string row;
+  for (const Column& column : kColumns) row += column.text(report) + ",";
+  return row + flag(blind);
+}
+
+bool was_blind(const std::string& columns) { return !columns.empty() && columns.back() == '1'; }
 
 std::string row_column_names() {
   std::string names;
-  for (const Column& column : kColumns) names += (names.empty() ? "" : ",") + std::string(column.name);
-  return names;
+  for (const Column& column : kColumns) names += std::string(column.name) + ",";
+  return names + "blind";
 }
 
 core::Result<void> write_frame_rows(const std::filesystem::path& file, const std::string& columns,

@@ -12,8 +12,13 @@
 
 namespace plumbline::pipeline {
 
-/// Values of a tracked frame, comma-separated.
-std::string row_columns(const mapping::FrameReport& report);
+/// True if a frame shows nothing: hardly any depth, or a picture without contrast and corners.
+bool shows_nothing(const sensor::RgbdFrame& frame, std::size_t corners);
+
+/// Values of a tracked frame, comma-separated; `blind`: it shows nothing.
+std::string row_columns(const mapping::FrameReport& report, bool blind);
+/// The flag that row_columns() was given.
+bool was_blind(const std::string& columns);
 /// The names of these columns, comma-separated.
 std::string row_column_names();
 /// One line for every frame of the run, the unreadable ones too; `columns`: names of FrameRow::columns.

@@ -14,6 +14,7 @@
 #include "plumbline/core/json.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/core/version.hpp"
+#include "plumbline/pipeline/verdict.hpp"
 #include "summary/sections.hpp"
 
 namespace plumbline::pipeline {
@@ -67,27 +68,6 @@ double tracked_percent(const Json& frames) {
   return all > 0.0 ? 100.0 * frames.at("tracked").get<double>() / all : 0.0;
 }
 
-/// The gravest doubt: a mistake made with the recording comes first, as the cause of others; lost frames are
-/// reported together with components that stayed apart.
-std::string reason_of(const Graph& graph, const Json& summary) {
-  std::vector<Doubt> reasons;
-  for (const Node& node : graph.nodes) node.stage->doubt(summary, reasons);
-  if (reasons.empty()) return {};
-  const auto rank = [](const Doubt& doubt) {
-    return doubt.about == Doubt::About::kRecording ? -1 : static_cast<int>(doubt.about);
-  };
-  std::stable_sort(reasons.begin(), reasons.end(),
-                   [&](const Doubt& x, const Doubt& y) { return rank(x) < rank(y); });
-
-  std::string reason = reasons.front().text;
-  const auto apart = std::find_if(reasons.begin(), reasons.end(), [](const Doubt& doubt) {
-    return doubt.about == Doubt::About::kComponents;
-  });
-  if (reasons.front().about == Doubt::About::kLostFrames && apart != reasons.end())
-    reason += "; " + apart->text;
-  return reason;
-}
-
 /// Counts of frames that arrived and were mapped, and of the others.
 std::string live_text(const Json& live) {
   const auto count = [&](const char* name) { return live.at(name).get<std::size_t>(); };
@@ -123,12 +103,7 @@ std::string time_text(const Json& summary) {
 std::string text_of(const Json& summary) {
   const Json& frames = summary.at("frames");
   const auto count = [](const Json& number) { return number.get<std::size_t>(); };
-  std::string text;
-  if (summary.contains("check")) {
-    const auto reason = summary.at("reason").get<std::string>();
-    text += reason.empty() ? summary.at("check").at("sentence").get<std::string>() + "\n"
-                           : fmt::format("Not trustworthy: {}.\n", reason);
-  }
+  std::string text = sentence_of(summary) + "\n";
 
   if (summary.at("stopped").get<bool>()) {
     text +=
@@ -190,9 +165,10 @@ RunSummary summary_of(const Graph& graph, const RunReport& report, const RunFact
   summary["seed"] = 0;
 
   RunSummary result;
-  result.reason = reason_of(graph, summary);
-  summary["trustworthy"] = result.reason.empty();
-  summary["reason"] = result.reason;
+  std::vector<Doubt> doubts;
+  for (const Node& node : graph.nodes) node.stage->doubt(summary, doubts);
+  set_verdict(std::move(doubts), summary);
+  result.reason = reason_of(summary);
   // Names of files need not be UTF-8: replace what JSON cannot hold.
   result.json = core::json_text(summary);
   result.text = text_of(summary);

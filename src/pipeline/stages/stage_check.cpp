@@ -160,7 +160,7 @@ class CheckStage : public Stage {
     }
   }
 
-  bool enabled_ = false;
+  bool enabled_ = true;
   const RunContext* context_ = nullptr;
   std::optional<check::FrameStore> store_;
   std::vector<check::FrameChoice> choices_;          ///< by robot

@@ -78,7 +78,7 @@ class TrackStage : public Stage {
     const int taken_back = slam.taken_back();
     const mapping::FrameReport report = slam.process(*frame, features);
     if (slam.taken_back() > taken_back) unstored_[number].since = {};  // edges that are stored have changed
-    note(io.frame(), robot, report);
+    note(io.frame(), robot, report, shows_nothing(*frame, features->points.size()));
 
     auto tracked = std::make_shared<TrackedFrame>();
     tracked->robot = robot.number;
@@ -135,6 +135,7 @@ class TrackStage : public Stage {
     // A dropped component's frames have no pose.
     Json& frames = summary["frames"];
     report_frames(rows_, frames);
+    frames["period_s"] = rounded(period_s());
     frames["tracked"] = frames["tracked"].get<std::size_t>() - dropped_frames_;
     add(frames["lost"], dropped_frames_);
 
@@ -176,10 +177,11 @@ class TrackStage : public Stage {
     return found != causes_.end() ? found->second : 0;
   }
 
-  void note(std::size_t frame, const RobotInfo& robot, const mapping::FrameReport& report) {
-    const std::string columns = row_columns(report);
+  void note(std::size_t frame, const RobotInfo& robot, const mapping::FrameReport& report, bool blind) {
+    const std::string columns = row_columns(report, blind);
     rows_.push_back({frame, tracking::to_string(report.state),
                      several() ? core::csv_field(robot.name) + "," + columns : columns});
+    mark_blind(rows_.size() - 1);
     if (report.keyframe.valid()) ++causes_[report.decision.cause];
     if (report.component.valid()) ++component_frames_[report.component];
 
@@ -188,6 +190,25 @@ class TrackStage : public Stage {
     bundle_ms_.resize(frame + 1, std::numeric_limits<float>::quiet_NaN());
     bundle_wait_ms_.back() = static_cast<float>(report.bundle.wait_ms);
     bundle_ms_.back() = static_cast<float>(report.bundle.solve_ms);
+  }
+
+  /// Three lost frames in a row that show nothing are blind.
+  void mark_blind(std::size_t row) {
+    constexpr std::size_t kFewest = 3;
+    std::vector<std::size_t>& run = blind_[recordings().robot_of(rows_[row].frame)];
+    if (rows_[row].state != "tracked" && was_blind(rows_[row].columns))
+      run.push_back(row);
+    else
+      run.clear();
+    if (run.size() < kFewest) return;
+    for (const std::size_t of_run : run) rows_[of_run].blind = true;
+  }
+
+  /// Time between two frames; 0: not known.
+  [[nodiscard]] double period_s() const {
+    if (rows_.size() <= slams_.size()) return 0.0;
+    const double span = recordings().time_of(rows_.back().frame) - recordings().time_of(rows_.front().frame);
+    return std::max(0.0, span) / (static_cast<double>(rows_.size()) / static_cast<double>(slams_.size()));
   }
 
   /// Adds the map for its readers while it grows: other robots, and the store.
@@ -231,6 +252,7 @@ class TrackStage : public Stage {
   /// Continues where another run stopped, with the cameras that it had found.
   void restore(const ResumedRun& run) {
     rows_ = run.rows;
+    for (std::size_t i = 0; i < rows_.size(); ++i) mark_blind(i);
     if (run.merged) cameras_->resume(run.merged->robots, slams_);
     if (!run.maps.empty()) cameras_->resume(run.maps.begin()->second.header.robots, slams_);
 
@@ -259,6 +281,7 @@ class TrackStage : public Stage {
   std::vector<RobotInfo> stored_robots_;  ///< it learns of a robot's camera with its next keyframe
   int stored_news_ = 0;
   std::vector<FrameRow> rows_;
+  std::map<std::int32_t, std::vector<std::size_t>> blind_;    ///< by robot, rows that end a run without sight
   std::map<mapping::KeyframeCause, std::size_t> causes_;      ///< of the keyframes
   std::map<core::KeyframeId, std::size_t> component_frames_;  ///< by root, as the frames were tracked
   std::size_t dropped_ = 0;                                   ///< components, as too small

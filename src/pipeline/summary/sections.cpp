@@ -22,6 +22,7 @@ Json empty_sections() {
           {"pipeline", ""},
           {"trustworthy", true},
           {"reason", ""},
+          {"verdict", Json::object()},
           {"unchecked", none},
           {"signs", none},
           {"stopped", false},
@@ -34,6 +35,8 @@ Json empty_sections() {
             {"odometry", 0},
             {"tracked", 0},
             {"lost", 0},
+            {"blind", 0},
+            {"period_s", 0.0},
             {"longest_loss", 0},
             {"tracked_percent", 0.0}}},
           {"keyframes", 0},
@@ -93,15 +96,17 @@ Json section_of(const Sigma& sigma) {
 void add(Json& number, std::size_t more) { number = number.get<std::size_t>() + more; }
 
 void report_frames(const std::vector<FrameRow>& rows, Json& frames) {
-  std::size_t tracked = 0, lost = 0, loss = 0, longest_loss = 0;
+  std::size_t tracked = 0, lost = 0, blind = 0, loss = 0, longest_loss = 0;
   for (const FrameRow& row : rows) {
     const bool is_tracked = row.state == "tracked";
     ++(is_tracked ? tracked : lost);
+    blind += row.blind ? 1U : 0U;
     loss = is_tracked ? 0 : loss + 1;
     longest_loss = std::max(longest_loss, loss);
   }
   frames["tracked"] = tracked;
   frames["lost"] = lost;
+  frames["blind"] = blind;
   frames["longest_loss"] = longest_loss;
 }
 
@@ -140,7 +145,18 @@ void doubt_lost_frames(const Json& summary, std::vector<Doubt>& reasons) {
   const Json& frames = summary.at("frames");
   const auto count = [&](const char* name) { return frames.at(name).get<std::size_t>(); };
   const std::size_t missing = count("missing");
-  const std::size_t all = count("read") + count("unreadable") + missing;
+  const std::size_t every = count("read") + count("unreadable") + missing;
+  const std::size_t blind = std::min(every, count("blind"));
+  if (2 * blind > every) {
+    reasons.push_back(
+        {Doubt::About::kLostFrames, fmt::format("nothing can be seen in {} of {} frames: no depth, or a "
+                                                "picture without contrast",
+                                                blind, every)});
+    return;
+  }
+
+  // Frames that showed nothing could not be tracked by anything.
+  const std::size_t all = every - blind;
   const std::size_t without = all - std::min(all, count("tracked"));
   const double percent = all > 0 ? 100.0 * static_cast<double>(without) / static_cast<double>(all) : 0.0;
   if (percent <= kMostLostPercent) return;
@@ -149,7 +165,7 @@ void doubt_lost_frames(const Json& summary, std::vector<Doubt>& reasons) {
       {Doubt::About::kLostFrames, fmt::format("{} of {} frames have no pose ({:.1f} %; up to {:.0f} % would "
                                               "be trusted): {} lost, {} unreadable{}; "
                                               "the longest loss is {} frames",
-                                              without, all, percent, kMostLostPercent, count("lost"),
+                                              without, all, percent, kMostLostPercent, count("lost") - blind,
                                               count("unreadable"), none, count("longest_loss"))});
 }
 

@@ -59,12 +59,23 @@ TEST_F(Checks, PathsOfOtherPrograms) {
 
 TEST_F(Checks, EndOfMap) {
   film();
-  const Outcome mapped = run("map world/robot0 -o out --set output.views= --set check.enabled=on");
+  const Outcome mapped = run("map world/robot0 -o out --set output.views=");
   ASSERT_EQ(mapped.code, 0) << mapped;
   EXPECT_EQ(mapped.out.rfind("Shape ± ", 0), 0U) << mapped;
-  const auto in_map = read_json(path("out/summary.json"))["check"];
+  const auto summary = read_json(path("out/summary.json"));
+  const auto& in_map = summary["check"];
   EXPECT_TRUE(in_map["trusted"]) << in_map;
   EXPECT_LT(in_map["expected_m"], 0.008) << in_map;
+
+  // One sentence first, everywhere; what is told follows from the verdict.
+  const auto& verdict = summary["verdict"];
+  EXPECT_EQ(mapped.out.rfind(verdict["sentence"].get<std::string>(), 0), 0U) << mapped;
+  EXPECT_EQ(run("info out").out.rfind(verdict["sentence"].get<std::string>(), 0), 0U);
+  EXPECT_EQ(verdict["accuracy"]["expected_m"], in_map["expected_m"]);
+  EXPECT_TRUE(verdict["accuracy"]["trusted"] && verdict["accuracy"]["reasons"].empty()) << verdict;
+  EXPECT_EQ(verdict["coverage"]["tracked"], 1.0) << verdict;
+  EXPECT_EQ(verdict["coverage"]["components"], 1) << verdict;
+  EXPECT_EQ(in_map["along"].size(), in_map["anchors"].get<std::size_t>());
 
   // The command sees the same, from the recording.
   ASSERT_EQ(run("check out world/robot0 --json again.json -q").code, 0);
@@ -77,13 +88,35 @@ TEST_F(Checks, EndOfMap) {
     pose.world_from_camera = pose.world_from_camera.inverse();
   });
   const Outcome given =
-      run("map world/robot0 -o given -p known_poses --set poses.file=mirrored.txt --set output.views= "
-          "--set check.enabled=on");
+      run("map world/robot0 -o given -p known_poses --set poses.file=mirrored.txt --set output.views=");
   EXPECT_EQ(given.code, 4) << given;
   EXPECT_EQ(given.out.rfind("Not trustworthy: ", 0), 0U) << given;
-  const Outcome off = run("map world/robot0 -o off -p fast --set output.views=");
+  EXPECT_FALSE(read_json(path("given/summary.json"))["verdict"]["accuracy"]["trusted"]);
+  const Outcome off = run("map world/robot0 -o off -p fast --set output.views= --set check.enabled=off");
   EXPECT_EQ(off.code, 0) << off;
-  EXPECT_FALSE(read_json(path("off/summary.json")).contains("check"));
+  const auto without = read_json(path("off/summary.json"));
+  EXPECT_FALSE(without.contains("check"));
+  EXPECT_TRUE(without["verdict"]["accuracy"]["expected_m"].is_null());
+
+  // Of a single frame nothing can be said.
+  const Outcome one = run("map world/robot0 -o one --to 0.01 --set output.views=");
+  EXPECT_EQ(one.code, 0) << one;
+  EXPECT_EQ(one.out.rfind("No reason to doubt", 0), 0U) << one;
+}
+
+TEST_F(Checks, FramesThatShowNothingAreNotLost) {
+  ASSERT_EQ(run("synth room -o dark --frames 90 --fps 15 --width 320 --height 240 --reference-spacing 20cm "
+                "--seed 3 --events cover@4.4+1.6 -q")
+                .code,
+            0);
+  const Outcome mapped = run("map dark/robot0 -o out --set output.views=");
+  const auto summary = read_json(path("out/summary.json"));
+  const auto& coverage = summary["verdict"]["coverage"];
+  EXPECT_EQ(mapped.code, 0) << mapped;
+  EXPECT_GT(summary["frames"]["lost"], 9) << "a quarter of the frames is dark";
+  EXPECT_NEAR(coverage["blind_s"], 1.5, 0.3) << coverage;
+  EXPECT_LT(coverage["lost_s"], 0.5) << coverage;
+  EXPECT_GT(coverage["tracked"], 0.9) << coverage;
 }
 
 }  // namespace

@@ -25,6 +25,7 @@ std::string banner(const char* kind, const std::string& title, const std::string
 std::string verdict_html(const ReportData& data) {
   const auto& s = data.summary;
   const double without = number_at(s, "/frames/lost") + number_at(s, "/frames/unreadable");
+  const std::string sentence = text_at(s, "/verdict/sentence");
   std::string out;
 
   if (!flag_at(s, "/trustworthy")) {
@@ -33,14 +34,16 @@ std::string verdict_html(const ReportData& data) {
                   reason.empty() ? "The run gave no reason." : "Reason: " + reason + ".");
 
   } else if (without > 0.0) {
-    out += banner(
-        "warn", "Trustworthy, with gaps (exit code 0)",
-        fmt::format("{} of {} frames have no pose; the longest loss is {} frames.", count_text(without),
-                    count_text(number_at(s, "/frames/read") + number_at(s, "/frames/unreadable")),
-                    count_at(s, "/frames/longest_loss")));
+    out += banner("warn", "Trustworthy, with gaps (exit code 0)",
+                  fmt::format("{} {} of {} frames have no pose; the longest loss is {} frames.", sentence,
+                              count_text(without),
+                              count_text(number_at(s, "/frames/read") + number_at(s, "/frames/unreadable")),
+                              count_at(s, "/frames/longest_loss")));
   } else {
     out += banner("good", "Trustworthy (exit code 0)",
-                  "The run found no reason to doubt this result. " + text_at(s, "/check/sentence"));
+                  sentence +
+                      " The run found no reason to doubt this result; ± is of its shape, as a scale that is "
+                      "wrong changes nothing but lengths.");
   }
 
   if (flag_at(s, "/stopped")) {
@@ -134,7 +137,6 @@ std::string facts(const ReportData& data) {
   return facts_html({{"Input", text_at(s, "/input")},
                      {"Robots", robots_text(data)},
                      {"Frames", frames_text(data)},
-                     {"Check of the path", text_at(s, "/check/sentence")},
                      {"Mistakes", mistakes_text(s)},
                      {"Duration of the recording", duration_text(data.end_s - data.start_s)},
                      {"Pipeline", text_at(s, "/pipeline")},

@@ -26,6 +26,8 @@ nlohmann::ordered_json tears_of(const nlohmann::ordered_json& summary) {
                                                           : nlohmann::ordered_json::array();
 }
 
+constexpr double kLeastDoubt_m = 0.005;
+
 class PathChart {
  public:
   explicit PathChart(const ReportData& data) : data_(data), axes_(plan_axes(data)) {
@@ -40,7 +42,7 @@ class PathChart {
     for (const ReportPath& path : data_.paths) add_truth(path);
     add_loops();
     for (const ReportPath& path : data_.paths) add(path);
-    add_tears();
+    add_doubts();
     if (!lost_.x.empty()) chart_.lines.push_back(lost_);
     for (viz::SvgDots* dots : {&start_, &end_}) {
       if (!dots->x.empty()) chart_.dots.push_back(*dots);
@@ -108,21 +110,32 @@ class PathChart {
     chart_.lines.push_back(std::move(line));
   }
 
-  /// Adds marks where the path jumps although the tracker saw no jump.
-  void add_tears() {
+  /// Adds marks where the path jumps although the tracker saw no jump, and where pairs of frames ask for
+  /// another one.
+  void add_doubts() {
     viz::SvgDots torn{"torn", "lost", {}, {}, 7.0, true};
-    for (const auto& tear : tears_of(data_.summary)) {
-      for (const ReportPath& path : data_.paths) {
-        if (data_.paths.size() > 1 && path.number != static_cast<std::size_t>(tear.value("robot", 0)))
-          continue;
-        const double stamp = tear.value("stamp", 0.0);
-        const auto at =
-            std::lower_bound(path.poses.begin(), path.poses.end(), stamp - 1e-6,
-                             [](const geometry::StampedPose& p, double s) { return p.stamp < s; });
-        if (at != path.poses.end()) put(torn, at->world_from_camera.translation);
-      }
-    }
+    for (const auto& tear : tears_of(data_.summary)) mark(tear, torn);
     if (!torn.x.empty()) chart_.dots.push_back(std::move(torn));
+
+    viz::SvgDots doubtful{"off by more than the result as a whole", "loop", {}, {}, 4.0, true};
+    const auto& check = data_.summary.value("check", nlohmann::ordered_json::object());
+    const double usual_m = std::max(kLeastDoubt_m, check.value("p95_m", 0.0));
+    for (const auto& place : check.value("along", nlohmann::ordered_json::array())) {
+      if (place.value("off_m", 0.0) > usual_m) mark(place, doubtful);
+    }
+    if (!doubtful.x.empty()) chart_.dots.push_back(std::move(doubtful));
+  }
+
+  /// Adds a dot at a place of summary.json.
+  void mark(const nlohmann::ordered_json& place, viz::SvgDots& dots) const {
+    for (const ReportPath& path : data_.paths) {
+      if (data_.paths.size() > 1 && path.number != static_cast<std::size_t>(place.value("robot", 0)))
+        continue;
+      const double stamp = place.value("stamp", 0.0);
+      const auto at = std::lower_bound(path.poses.begin(), path.poses.end(), stamp - 1e-6,
+                                       [](const geometry::StampedPose& p, double s) { return p.stamp < s; });
+      if (at != path.poses.end()) put(dots, at->world_from_camera.translation);
+    }
   }
 
   const ReportData& data_;
