@@ -17,9 +17,10 @@ class Localize : public ProgramTest {
   void map_first_part() const {
     const Outcome filmed = run("synth room -o world --frames 60 --fps 10 --width 320 --height 240 -q");
     ASSERT_EQ(filmed.code, 0) << filmed;
-    const Outcome mapped = run(
-        "map world -o a --to 3.5 -q --set output.views= --set output.pcd=off --set cloud.filters=[] --set "
-        "fuse.voxel=3cm");
+    const Outcome mapped =
+        run("map world/robot0 -o a --to 3.5 -q --set output.views= --set output.pcd=off --set "
+            "cloud.filters=[] --set "
+            "fuse.voxel=3cm");
     ASSERT_EQ(mapped.code, 0) << mapped;
   }
 
@@ -39,8 +40,8 @@ TEST_F(Localize, PosesAreInTheFrameOfTheMapWhichStaysAsItIs) {
   map_first_part();
   const auto before = state_of("a");
   fs::permissions(path("a"), fs::perms::owner_read | fs::perms::owner_exec);
-  const Outcome o = run("localize a world -o here --from 1.5 --threads 1");
-  const Outcome again = run("localize a/map.db world -o again --from 1.5 --threads 2 -q");
+  const Outcome o = run("localize a world/robot0 -o here --from 1.5 --threads 1");
+  const Outcome again = run("localize a/map.db world/robot0 -o again --from 1.5 --threads 2 -q");
   fs::permissions(path("a"), fs::perms::owner_all);
   ASSERT_EQ(o.code, 0) << o;
   ASSERT_EQ(again.code, 0) << again;
