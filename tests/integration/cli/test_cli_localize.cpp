@@ -17,9 +17,10 @@ class Localize : public ProgramTest {
   void map_first_part() const {
     const Outcome filmed = run("synth room -o world --frames 60 --fps 10 --width 320 --height 240 -q");
     ASSERT_EQ(filmed.code, 0) << filmed;
-    const Outcome mapped = run(
-        "map world/robot0 -o a --to 3.5 -q --set output.views= --set output.pcd=off --set cloud.filters=[] --set "
-        "fuse.voxel=3cm");
+    const Outcome mapped =
+        run("map world/robot0 -o a --to 3.5 -q --set output.views= --set output.pcd=off --set "
+            "cloud.filters=[] --set "
+            "fuse.voxel=3cm");
     ASSERT_EQ(mapped.code, 0) << mapped;
   }
 
