@@ -158,6 +158,7 @@ void doubt_lost_frames(const Json& summary, std::vector<Doubt>& reasons) {
   // Frames that showed nothing could not be tracked by anything.
   const std::size_t all = every - blind;
   const std::size_t without = all - std::min(all, count("tracked"));
+
   const double percent = all > 0 ? 100.0 * static_cast<double>(without) / static_cast<double>(all) : 0.0;
   if (percent <= kMostLostPercent) return;
   const std::string none = missing > 0 ? fmt::format(", {} without files", missing) : "";
