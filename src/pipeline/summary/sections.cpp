@@ -147,6 +147,7 @@ void doubt_lost_frames(const Json& summary, std::vector<Doubt>& reasons) {
   const std::size_t missing = count("missing");
   const std::size_t every = count("read") + count("unreadable") + missing;
   const std::size_t blind = std::min(every, count("blind"));
+
   if (2 * blind > every) {
     reasons.push_back(
         {Doubt::About::kLostFrames, fmt::format("nothing can be seen in {} of {} frames: no depth, or a "

@@ -98,7 +98,6 @@ void set_verdict(std::vector<Doubt> doubts, Json& summary) {
                {"reasons", std::move(coverage)}}},
              {"unchecked", unchecked_of(summary)}};
 
-
   summary["trustworthy"] = reason.empty();
   summary["reason"] = reason;
   verdict["sentence"] = told(summary);
