@@ -95,6 +95,7 @@ class CheckStage : public Stage {
   core::Result<void> finish(StageIo& io) override {
     if (!enabled_) return {};
     const auto map = io.input<MapResult>("map");
+
     const std::vector<RobotInfo>& robots = map->robots.empty() ? recordings().robots() : map->robots;
     check::CheckInput input;
     input.told_m = told_m(map->accuracy);
@@ -118,6 +119,7 @@ class CheckStage : public Stage {
     }
     if (input.frames.empty()) return {};
 
+    // Frames are read with the camera that is known now.
     input.read = [&](std::size_t number) -> core::Result<check::SmallFrame> {
       auto frame = store_->read(number);
       if (frame && change[number] != nullptr) return (*change[number])(*frame);

@@ -76,6 +76,7 @@ class TrackStage : public Stage {
     mapping::Slam& slam = *slams_[number];
     const std::size_t poses = slam.frame_poses().size();
     const int taken_back = slam.taken_back();
+
     const mapping::FrameReport report = slam.process(*frame, features);
     if (slam.taken_back() > taken_back) unstored_[number].since = {};  // edges that are stored have changed
     note(io.frame(), robot, report, shows_nothing(*frame, features->points.size()));

@@ -147,6 +147,7 @@ void doubt_lost_frames(const Json& summary, std::vector<Doubt>& reasons) {
   const std::size_t missing = count("missing");
   const std::size_t every = count("read") + count("unreadable") + missing;
   const std::size_t blind = std::min(every, count("blind"));
+
   if (2 * blind > every) {
     reasons.push_back(
         {Doubt::About::kLostFrames, fmt::format("nothing can be seen in {} of {} frames: no depth, or a "
@@ -158,6 +159,7 @@ void doubt_lost_frames(const Json& summary, std::vector<Doubt>& reasons) {
   // Frames that showed nothing could not be tracked by anything.
   const std::size_t all = every - blind;
   const std::size_t without = all - std::min(all, count("tracked"));
+
   const double percent = all > 0 ? 100.0 * static_cast<double>(without) / static_cast<double>(all) : 0.0;
   if (percent <= kMostLostPercent) return;
   const std::string none = missing > 0 ? fmt::format(", {} without files", missing) : "";

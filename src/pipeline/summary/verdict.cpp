@@ -73,6 +73,8 @@ void set_verdict(std::vector<Doubt> doubts, Json& summary) {
   const Json* check =
       summary.contains("check") && summary.at("check").at("pairs") > 0 ? &summary.at("check") : nullptr;
   const auto number = [&](const char* name) { return check != nullptr ? check->at(name) : Json(); };
+
+  // Parts of the map, and time in which nothing could be seen.
   const Json& list = summary.at("components").at("list");
   const auto apart =
       std::count_if(list.begin(), list.end(), [](const Json& c) { return !c.at("joined").get<bool>(); });
@@ -95,6 +97,7 @@ void set_verdict(std::vector<Doubt> doubts, Json& summary) {
                {"components", apart + 1},
                {"reasons", std::move(coverage)}}},
              {"unchecked", unchecked_of(summary)}};
+
   summary["trustworthy"] = reason.empty();
   summary["reason"] = reason;
   verdict["sentence"] = told(summary);

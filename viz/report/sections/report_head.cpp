@@ -26,8 +26,8 @@ std::string verdict_html(const ReportData& data) {
   const auto& s = data.summary;
   const double without = number_at(s, "/frames/lost") + number_at(s, "/frames/unreadable");
   const std::string sentence = text_at(s, "/verdict/sentence");
-  std::string out;
 
+  std::string out;
   if (!flag_at(s, "/trustworthy")) {
     const std::string reason = text_at(s, "/reason");
     out += banner("bad", "Not trustworthy (exit code 4)",
@@ -39,6 +39,7 @@ std::string verdict_html(const ReportData& data) {
                               count_text(without),
                               count_text(number_at(s, "/frames/read") + number_at(s, "/frames/unreadable")),
                               count_at(s, "/frames/longest_loss")));
+
   } else {
     out += banner("good", "Trustworthy (exit code 0)",
                   sentence +
