@@ -26,6 +26,7 @@ void FreeSpace::add(const ViewRays& rays) {
   constexpr double kLow_m = 0.05;
   constexpr double kHigh_m = 2.4;
   ++view_;
+
   cameras_.emplace_back(rays.origin.head<2>());
   for (const Eigen::Vector3f& end : rays.ends) {
     const Eigen::Vector3d way = end.cast<double>() - rays.origin;
@@ -50,12 +51,14 @@ double FreeSpace::share(const std::vector<Eigen::Vector2d>& outline) const {
     around.extend(p);
     middle += p / static_cast<double>(outline.size());
   }
+
   const auto holds = [&](const Eigen::Vector2d& p) {
     for (std::size_t i = 0; i < outline.size(); ++i) {
       const Eigen::Vector2d side = outline[(i + 1) % outline.size()] - outline[i];
       const Eigen::Vector2d way = p - outline[i];
       if (side.x() * way.y() - side.y() * way.x() < 0.0) return false;
     }
+
     return true;
   };
 
@@ -63,6 +66,7 @@ double FreeSpace::share(const std::vector<Eigen::Vector2d>& outline) const {
     return static_cast<int>(std::floor((p[axis] - box_.min()[axis]) / kCell_m));
   };
   int all = 0, free = 0;
+
   for (int y = number(around.min(), 1); y <= number(around.max(), 1); ++y) {
     for (int x = number(around.min(), 0); x <= number(around.max(), 0); ++x) {
       const Eigen::Vector2d place = box_.min() + kCell_m * Eigen::Vector2d(x + 0.5, y + 0.5);
@@ -71,6 +75,7 @@ double FreeSpace::share(const std::vector<Eigen::Vector2d>& outline) const {
       free += is_free(index(place)) ? 1 : 0;
     }
   }
+
   if (all == 0) return is_free(index(middle)) ? 1.0 : 0.0;  // narrower than a cell
   return static_cast<double>(free) / all;
 }

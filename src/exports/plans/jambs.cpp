@@ -20,11 +20,13 @@ std::optional<double> main_place(const std::vector<double>& places) {
   constexpr double kBin_m = 0.002;
   constexpr double kNear_m = 0.008;
   constexpr std::size_t kFewest = 25;
+
   if (places.size() < kFewest) return std::nullopt;
   const double first = *std::min_element(places.begin(), places.end());
   const double last = *std::max_element(places.begin(), places.end());
   double best = first;
   std::ptrdiff_t most = -1;
+
   for (double at = first; at <= last; at += kBin_m) {
     const auto near =
         std::count_if(places.begin(), places.end(), [&](double s) { return std::abs(s - at) < kNear_m; });
@@ -32,6 +34,7 @@ std::optional<double> main_place(const std::vector<double>& places) {
     most = near;
     best = at;
   }
+
   for (int round = 0; round < 3; ++round) {
     std::vector<double> near;
     std::copy_if(places.begin(), places.end(), std::back_inserter(near),
@@ -39,6 +42,7 @@ std::optional<double> main_place(const std::vector<double>& places) {
     if (near.size() < kFewest) return std::nullopt;
     best = core::median(near);
   }
+
   return best;
 }
 
@@ -73,9 +77,11 @@ void measure_jambs(const NearPoints& points, WallDoor& door) {
   constexpr double kAssumed_m = 0.1;
   constexpr double kFacing = 0.8;
   const Eigen::Vector2d along = (door.jambs[1] - door.jambs[0]).normalized();
+
   const double known = (door.far_jambs[0] - door.jambs[0]).norm();
   const double depth = known > 0.0 ? known : kAssumed_m;
   std::array<double, 2> ends{0.0, door.width_m};
+
   for (std::size_t k = 0; k < 2; ++k) {
     std::vector<double> places;
     for (std::size_t i = 0; i < points.places.size(); ++i) {
@@ -85,11 +91,13 @@ void measure_jambs(const NearPoints& points, WallDoor& door) {
           p.y() > -depth + kInside_m && p.z() > 0.15 && p.z() < 2.0)
         places.push_back(p.x());
     }
+
     const std::optional<double> found = main_place(places);
     door.jamb_seen[k] = found.has_value();
     if (found) ends[k] = *found;
   }
   const Eigen::Vector2d first = door.jambs[0], across = door.far_jambs[0] - door.jambs[0];
+
   for (std::size_t k = 0; k < 2; ++k) {
     door.jambs[k] = first + ends[k] * along;
     door.far_jambs[k] = door.jambs[k] + across;
@@ -126,6 +134,7 @@ void measure_heights(const cloud::Cloud& cloud, double floor_m, std::vector<Wall
   constexpr double kLowest_m = 1.9;
   constexpr double kFewestPerArea = 300.0;  // per square metre: a tenth of a ceiling
   std::vector<std::vector<double>> heights(rooms.size());
+
   for (const cloud::Point& p : cloud) {
     const double height = static_cast<double>(p.z) - floor_m;
     if (!(p.normal_z < -0.9F) || height < kLowest_m) continue;
@@ -136,6 +145,7 @@ void measure_heights(const cloud::Cloud& cloud, double floor_m, std::vector<Wall
       break;
     }
   }
+
   for (std::size_t i = 0; i < rooms.size(); ++i) {
     std::vector<double>& of_room = heights[i];
     if (static_cast<double>(of_room.size()) < kFewestPerArea * rooms[i].area_m2) continue;
@@ -152,26 +162,31 @@ std::vector<std::vector<Eigen::Vector2d>> furniture_outlines(const cloud::Cloud&
   constexpr double kAtWall_m = 0.07;  // pictures, casings, noise
   constexpr double kSmallest_m2 = 0.03;
   constexpr double kLargest_m = 500.0;
+
   std::vector<Eigen::Vector2d> places;
   Eigen::AlignedBox2d box;
   for (const cloud::Point& p : cloud) {
     const double height = static_cast<double>(p.z) - floor_m;
     const Eigen::Vector2d at = p.getVector3fMap().head<2>().cast<double>();
+
     if (height < kLow_m || height > kHigh_m) continue;
     const bool at_wall = std::any_of(walls.begin(), walls.end(), [&](const WallLine& wall) {
       const double s = wall.along().dot(at);
       return std::abs(wall.normal.dot(at) - wall.offset_m) < kAtWall_m && s > wall.s0 - kAtWall_m &&
              s < wall.s1 + kAtWall_m;
     });
+
     if (at_wall) continue;
     places.push_back(at);
     box.extend(at);
   }
+
   if (places.empty() || box.sizes().maxCoeff() > kLargest_m) return {};
 
   const Eigen::Vector2d low = box.min().array() - 3.0 * kCell_m;
   const Eigen::Array2i size = ((box.max() - low) / kCell_m).array().ceil().cast<int>() + 3;
   cv::Mat cells = cv::Mat::zeros(size.y(), size.x(), CV_8U);
+
   for (const Eigen::Vector2d& at : places) {
     const Eigen::Array2i cell = ((at - low) / kCell_m).array().floor().cast<int>();
     cells.at<std::uint8_t>(cell.y(), cell.x()) = 255;
@@ -181,15 +196,18 @@ std::vector<std::vector<Eigen::Vector2d>> furniture_outlines(const cloud::Cloud&
   std::vector<std::vector<cv::Point>> contours;
   cv::findContours(cells, contours, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
   std::vector<std::vector<Eigen::Vector2d>> outlines;
+
   for (const std::vector<cv::Point>& contour : contours) {
     if (cv::contourArea(contour) * kCell_m * kCell_m < kSmallest_m2) continue;
     std::vector<cv::Point> corners;
     cv::approxPolyDP(contour, corners, 1.5, true);
     std::vector<Eigen::Vector2d> outline;
+
     for (const cv::Point& p : corners)
       outline.emplace_back(low + kCell_m * Eigen::Vector2d(p.x + 0.5, p.y + 0.5));
     outlines.push_back(std::move(outline));
   }
+
   return outlines;
 }
 

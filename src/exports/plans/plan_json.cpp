@@ -23,6 +23,7 @@ PlanJson room_json(const WallRoom& room, std::size_t number) {
     outline.push_back(place(room.outline[i]));
     sides.push_back(kSides[static_cast<std::size_t>(room.side(i))]);
   }
+
   PlanJson json = {{"number", number},
                    {"closed", room.closed},
                    {"area_m2", to_tenth_mm(room.area_m2)},
@@ -32,6 +33,7 @@ PlanJson room_json(const WallRoom& room, std::size_t number) {
                    {"label_m", place(room.label)},
                    {"outline_m", outline},
                    {"sides", sides}};
+
   if (room.height_m > 0.0)
     json["heights_m"] = {to_tenth_mm(room.heights_m[0]), to_tenth_mm(room.heights_m[1])};
   return json;
@@ -68,12 +70,14 @@ std::string plan_json(const WallPlan& plan, const std::string& frame, double flo
                                {"thickness_m", known(wall.thickness_m)}});
     }
   }
+
   json["furniture"] = PlanJson::array();
   for (const auto& outline : plan.furniture) {
     PlanJson corners = PlanJson::array();
     for (const Eigen::Vector2d& corner : outline) corners.push_back(place(corner));
     json["furniture"].push_back({{"outline_m", corners}});
   }
+
   return core::json_text(json);
 }
 

@@ -68,16 +68,19 @@ std::vector<CuttingLine> cutting_lines(const std::vector<WallLine>& walls,
   std::vector<WallLine> sorted = walls;
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const WallLine& a, const WallLine& b) { return a.length() > b.length(); });
+
   for (const WallLine& wall : sorted) {
     const double beyond_m = wall.length() < kShort_m ? 0.3 : std::min(kBeyond_m, 0.3 + 1.5 * wall.length());
     lines.push_back({wall.at(wall.s0 - beyond_m), wall.along(), wall.length() + 2.0 * beyond_m});
   }
+
   for (const PlanOutline& opening : openings) {
     for (std::size_t i = 0; i < opening.size(); ++i) {
       const Eigen::Vector2d side = opening[(i + 1) % opening.size()] - opening[i];
       if (side.norm() > kThinnestCell_m) lines.push_back({opening[i], side.normalized(), side.norm()});
     }
   }
+
   return lines;
 }
 
@@ -89,6 +92,7 @@ void refine_cells(const FreeSpace& space, std::vector<PlanOutline>& cells) {
     const PlanOutline& cell = cells[i];
     Eigen::Vector2d along = Eigen::Vector2d::UnitX();
     double longest = 0.0;
+
     for (std::size_t k = 0; k < cell.size(); ++k) {
       const Eigen::Vector2d side = cell[(k + 1) % cell.size()] - cell[k];
       if (side.norm() <= longest) continue;
@@ -96,11 +100,13 @@ void refine_cells(const FreeSpace& space, std::vector<PlanOutline>& cells) {
       along = side / longest;
     }
     double s0 = 1e300, s1 = -1e300;
+
     for (const Eigen::Vector2d& p : cell) {
       s0 = std::min(s0, along.dot(p));
       s1 = std::max(s1, along.dot(p));
     }
     const double free = s1 - s0 > kLongest_m ? space.share(cell) : 0.0;
+
     if (free < kLeast || free > 1.0 - kLeast) {
       ++i;
       continue;
@@ -108,6 +114,7 @@ void refine_cells(const FreeSpace& space, std::vector<PlanOutline>& cells) {
     const Eigen::Vector2d middle = 0.5 * (s0 + s1) * along;
     const Eigen::Vector2d across(-along.y(), along.x());
     PlanOutline rest = left_of(cell, middle, -across);
+
     cells[i] = left_of(cell, middle, across);
     cells.push_back(std::move(rest));
   }
@@ -170,9 +177,11 @@ std::vector<RoomCell> cells_of(const Eigen::AlignedBox2d& box, const std::vector
     cell.free = space.share(outline);
     cell.opening = std::any_of(openings.begin(), openings.end(),
                                [&](const PlanOutline& opening) { return is_inside(opening, middle); });
+
     cell.outline = std::move(outline);
     cells.push_back(std::move(cell));
   }
+
   return cells;
 }
 
@@ -202,11 +211,13 @@ std::vector<CellBorder> borders_of(const std::vector<RoomCell>& cells) {
       }
     }
   };
+
   for (std::size_t a = 0; a < cells.size(); ++a) {
     for (std::size_t b = a + 1; b < cells.size(); ++b) {
       if (boxes[a].intersects(boxes[b])) add_common(a, b);
     }
   }
+
   return borders;
 }
 
@@ -219,11 +230,13 @@ std::vector<WallOpening> walled_parts(const PlanSegment& segment, const std::vec
   const auto add = [&](const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
     const Eigen::Vector2d side = (to - from).normalized();
     const Eigen::Vector2d middle = 0.5 * (segment[0] + segment[1]) - from;
+
     if (std::abs(cross_of(side, along)) > kTurn || std::abs(cross_of(side, middle)) > off_m) return;
     double s0 = along.dot(from - segment[0]) / length, s1 = along.dot(to - segment[0]) / length;
     if (s0 > s1) std::swap(s0, s1);
     if (s1 > 0.0 && s0 < 1.0) parts.push_back({std::max(0.0, s0), std::min(1.0, s1)});
   };
+
   for (const WallLine& wall : walls) add(wall.at(wall.s0), wall.at(wall.s1));
   for (const PlanOutline& opening : openings) {
     for (std::size_t i = 0; i < opening.size(); ++i) {
@@ -235,6 +248,7 @@ std::vector<WallOpening> walled_parts(const PlanSegment& segment, const std::vec
   std::sort(parts.begin(), parts.end(),
             [](const WallOpening& a, const WallOpening& b) { return a.s0 < b.s0; });
   std::vector<WallOpening> joined;
+
   for (const WallOpening& part : parts) {
     if (!joined.empty() && part.s0 <= joined.back().s1 + 0.005 / length) {
       joined.back().s1 = std::max(joined.back().s1, part.s1);
@@ -242,6 +256,7 @@ std::vector<WallOpening> walled_parts(const PlanSegment& segment, const std::vec
       joined.push_back(part);
     }
   }
+
   return joined;
 }
 

@@ -97,6 +97,7 @@ std::vector<bool> inside_cells(const std::vector<RoomCell>& cells, const std::ve
   constexpr double kUnwalled = 0.3;  // a metre of a limit without wall
   constexpr double kBorder = 0.01;   // a metre of any limit
   const std::size_t source = cells.size(), sink = cells.size() + 1;
+
   CutGraph graph(cells.size() + 2);
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const RoomCell& cell = cells[i];
@@ -104,6 +105,7 @@ std::vector<bool> inside_cells(const std::vector<RoomCell>& cells, const std::ve
     add_link(graph, i, sink,
              cell.opening ? 1e3 : kUnknown * (1.0 - cell.free) * cell.area_m2 + kBehind * behind[i], 0.0);
   }
+
   for (std::size_t k = 0; k < borders.size(); ++k) {
     const auto& [a, b, ends] = borders[k];
     if (cells[a].opening || cells[b].opening) continue;
@@ -111,6 +113,7 @@ std::vector<bool> inside_cells(const std::vector<RoomCell>& cells, const std::ve
       const double known = std::max(walled[k], total_of(parts_before_far_sides(side, walls)));
       return length_of(side) * (kBorder + kUnwalled * (1.0 - known));
     };
+
     add_link(graph, a, b, cost(ends), cost({ends[1], ends[0]}));
   }
   boost::boykov_kolmogorov_max_flow(graph, source, sink);
@@ -119,6 +122,7 @@ std::vector<bool> inside_cells(const std::vector<RoomCell>& cells, const std::ve
   const auto free = boost::color_traits<boost::default_color_type>::black();
   for (std::size_t i = 0; i < cells.size(); ++i)
     inside[i] = boost::get(boost::vertex_color, graph, i) == free;
+
   return inside;
 }
 
@@ -130,6 +134,7 @@ std::vector<int> room_numbers(const std::vector<RoomCell>& cells, const std::vec
   std::iota(root.begin(), root.end(), std::size_t{0});
   const auto find = [&](std::size_t i) {
     while (root[i] != i) i = root[i] = root[root[i]];
+
     return i;
   };
   for (std::size_t k = 0; k < borders.size(); ++k) {
@@ -137,11 +142,13 @@ std::vector<int> room_numbers(const std::vector<RoomCell>& cells, const std::vec
     if (inside[a] && inside[b] && walled[k] < kMostWalled)
       root[std::max(find(a), find(b))] = std::min(find(a), find(b));
   }
+
   std::map<std::size_t, int> numbers;
   std::vector<int> room(cells.size(), -1);
   for (std::size_t i = 0; i < cells.size(); ++i) {
     if (inside[i]) room[i] = numbers.emplace(find(i), static_cast<int>(numbers.size())).first->second;
   }
+
   return room;
 }
 
@@ -162,6 +169,7 @@ std::vector<PlanOutline> outlines_of(const std::vector<PlanSegment>& limits) {
   constexpr double kSame_m = 2e-5;
   std::vector<bool> used(limits.size(), false);
   std::vector<PlanOutline> outlines;
+
   for (std::size_t first = 0; first < limits.size(); ++first) {
     if (used[first]) continue;
     PlanOutline outline;
@@ -184,6 +192,7 @@ std::vector<PlanOutline> outlines_of(const std::vector<PlanSegment>& limits) {
       if (next == limits.size()) break;
       at = next;
     }
+
     if (outline.size() >= 3) outlines.push_back(std::move(outline));
   }
   return outlines;
@@ -236,6 +245,7 @@ std::vector<SidePart> side_parts(const PlanSegment& side, const RoomWalls& of) {
       parts.push_back({from, end, kind});
       from = end;
     }
+
     if ((to - from) * length > 1e-6) rest(from, to);
   };
 
@@ -244,6 +254,7 @@ std::vector<SidePart> side_parts(const PlanSegment& side, const RoomWalls& of) {
   const auto limit = [&](double from, double to) { parts.push_back({from, to, RoomSide::kLimit}); };
   const auto explained = [&](double from, double to) { fill(behind, from, to, RoomSide::kGap, limit); };
   const auto open = [&](double from, double to) { fill(closed, from, to, RoomSide::kGap, explained); };
+
   fill(walled_parts(side, of.walls, of.openings), 0.0, 1.0, RoomSide::kWall, open);
   return parts;
 }
@@ -259,17 +270,20 @@ void name_sides(const RoomWalls& of, WallRoom& room) {
       room.sides.push_back(part.kind);
     }
   }
+
   room.outline = std::move(corners);
 
   const std::size_t count = room.sides.size();
   const auto other = std::find_if(room.sides.begin(), room.sides.end(),
                                   [](RoomSide side) { return side != RoomSide::kLimit; });
   const auto begin = static_cast<std::size_t>(other == room.sides.end() ? 0 : other - room.sides.begin());
+
   for (std::size_t k = 0; k < count;) {
     double gap_m = 0.0;
     std::size_t end = k;
     for (; end < count && room.sides[(begin + end) % count] == RoomSide::kLimit; ++end)
       gap_m += (room.outline[(begin + end + 1) % count] - room.outline[(begin + end) % count]).norm();
+
     if (gap_m > kLongestGap_m) {
       room.closed = false;
     } else {
@@ -286,11 +300,13 @@ Eigen::Vector2d label_place_in(const std::vector<PlanOutline>& rings) {
   for (const Eigen::Vector2d& p : rings.front()) box.extend(p);
   Eigen::Vector2d best = box.center();
   double farthest = -1.0;
+
   for (int k = 0; k < kSteps * kSteps; ++k) {
     const Eigen::Array2d part((k % kSteps + 0.5) / kSteps, (k / kSteps + 0.5) / kSteps);
     const Eigen::Vector2d place = box.min().array() + part * box.sizes().array();
     if (!is_inside(rings.front(), place)) continue;
     double distance = 1e300;
+
     for (const PlanOutline& ring : rings) {
       if (&ring != &rings.front() && is_inside(ring, place)) distance = -1.0;
       for (std::size_t i = 0; i < ring.size(); ++i) {
@@ -299,10 +315,12 @@ Eigen::Vector2d label_place_in(const std::vector<PlanOutline>& rings) {
         distance = std::min(distance, (place - ring[i] - t * side).norm());
       }
     }
+
     if (distance <= farthest + 1e-9) continue;
     farthest = distance;
     best = place;
   }
+
   return best;
 }
 
@@ -340,6 +358,7 @@ std::vector<WallRoom> rooms_in(const Eigen::AlignedBox2d& box, const std::vector
   const std::vector<CellBorder> borders = borders_of(cells);
   std::vector<WallLine> all = walls;
   all.insert(all.end(), closings.begin(), closings.end());
+
   const std::vector<double> walled = walled_shares(borders, all, openings);
   const std::vector<bool> inside = inside_cells(cells, borders, walled, walls);
   const std::vector<int> room_of = room_numbers(cells, borders, walled, inside);
@@ -361,6 +380,7 @@ std::vector<WallRoom> rooms_in(const Eigen::AlignedBox2d& box, const std::vector
     room.label = label_place_in(rings);
     rooms.push_back(std::move(room));
   }
+
   std::stable_sort(rooms.begin(), rooms.end(),
                    [](const WallRoom& a, const WallRoom& b) { return a.area_m2 > b.area_m2; });
   return rooms;

@@ -66,9 +66,11 @@ WallLine joined_pieces(const WallLine& a, const WallLine& b) {
   line.normal = across.dot(a.normal) < 0.0 ? Eigen::Vector2d(-across) : across;
   line.offset_m = line.normal.dot(middle);
   line.s0 = line.along().dot(a.at(a.s0));
+
   line.s1 = line.along().dot(b.at(b.s1));
   line.openings.clear();
   line.gaps.clear();
+
   for (const WallLine* piece : {&a, &b}) {
     const auto on_line = [&](const WallOpening& part) -> WallOpening {
       return {line.along().dot(piece->at(part.s0)), line.along().dot(piece->at(part.s1))};
@@ -81,6 +83,7 @@ WallLine joined_pieces(const WallLine& a, const WallLine& b) {
   line.corner[1] = b.corner[1];
   line.top_m = std::max(a.top_m, b.top_m);
   line.high = std::max(a.high, b.high);
+
   return line;
 }
 
@@ -165,6 +168,7 @@ std::vector<WallDoor> doors_of(std::vector<WallLine>& walls) {
   std::vector<WallDoor> doors;
   std::vector<std::vector<bool>> used;
   used.reserve(walls.size());
+
   for (const WallLine& wall : walls) used.emplace_back(wall.openings.size(), false);
 
   for (std::size_t i = 0; i < walls.size(); ++i) {
@@ -239,6 +243,7 @@ void find_far_sides(const std::vector<WallLine>& walls, std::vector<WallDoor>& d
   for (WallDoor& door : doors) {
     const Eigen::Vector2d along = (door.jambs[1] - door.jambs[0]).normalized();
     const Eigen::Vector2d behind(-along.y(), along.x());
+
     if ((door.far_jambs[0] - door.jambs[0]).norm() > kThinnest_m) continue;
     double nearest = kThickestWall_m;
     for (const WallLine& wall : walls) {
@@ -273,6 +278,7 @@ std::vector<WallDoor> doors_at_free_ends(const std::vector<WallLine>& walls,
   constexpr double kFarthestMet_m = 2.5;  // of a wall whose other end meets one
   constexpr double kLeastTurn = 0.5;
   constexpr double kBeside_m = 0.15;
+
   std::vector<WallDoor> found;
   for (const WallLine& wall : walls) {
     for (std::size_t end = 0; end < 2; ++end) {
@@ -307,6 +313,7 @@ std::vector<WallDoor> doors_at_free_ends(const std::vector<WallLine>& walls,
       found.push_back(door);
     }
   }
+
   return found;
 }
 

@@ -42,18 +42,21 @@ bool stands_before_wall(const WallLine& side, const std::vector<WallLine>& walls
   constexpr double kReach_m = 0.4;
   constexpr double kSeenBehind = 0.6;  // share of the side
   bool before = false, behind = false;
+
   double seen_m = 0.0;
   for (const WallLine& wall : walls) {
     if (wall.normal.dot(side.normal) < 0.998) continue;
     const double s0 = wall.along().dot(side.at(side.s0));
     const double s1 = wall.along().dot(side.at(side.s1));
     const double distance = wall.normal.dot(side.at(0.5 * (side.s0 + side.s1))) - wall.offset_m;
+
     if (distance < kNearest_m || distance > kFarthest_m) continue;
     if (wall.s0 - kReach_m < s0 && wall.s1 + kReach_m > s1 && wall.length() > side.length()) return true;
     seen_m += std::max(0.0, std::min(wall.s1, s1) - std::max(wall.s0, s0));
     before = before || (wall.s0 < s0 && wall.s1 > s0 - kReach_m);
     behind = behind || (wall.s1 > s1 && wall.s0 < s1 + kReach_m);
   }
+
   return (before && behind) || seen_m > kSeenBehind * side.length();
 }
 

@@ -74,6 +74,7 @@ std::vector<WallOpening> gaps_between(const WallRaster& raster, double s0, doubl
   constexpr double kNarrowest_m = 0.3;
   constexpr double kLowestSill_m = 0.25;
   const int begin = raster.column_of(s0);
+
   const int end = raster.column_of(s1);
   std::vector<std::pair<int, int>> runs;
   for (int c = begin; c <= end; ++c) {
@@ -96,6 +97,7 @@ std::vector<WallOpening> gaps_between(const WallRaster& raster, double s0, doubl
     const bool beside = a >= begin + kBeside && b <= end - kBeside;
     if (2 * crossed >= b - a + 1 || (beside && is_window(raster, a, b, cut))) gaps.push_back(gap);
   }
+
   return gaps;
 }
 

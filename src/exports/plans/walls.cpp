@@ -73,17 +73,21 @@ void move_plan(const Eigen::Vector2d& shift, WallPlan& plan) {
     wall.offset_m += wall.normal.dot(shift);
     wall.s0 += along_m;
     wall.s1 += along_m;
+
     for (auto* parts : {&wall.openings, &wall.gaps}) {
       for (WallOpening& part : *parts) part = {part.s0 + along_m, part.s1 + along_m};
     }
   }
+
   for (WallDoor& door : plan.doors) {
     for (Eigen::Vector2d& jamb : door.jambs) jamb += shift;
     for (Eigen::Vector2d& jamb : door.far_jambs) jamb += shift;
   }
+
   for (auto& outline : plan.furniture) {
     for (Eigen::Vector2d& corner : outline) corner += shift;
   }
+
   for (WallRoom& room : plan.rooms) {
     for (Eigen::Vector2d& corner : room.outline) corner += shift;
     room.label += shift;
@@ -96,6 +100,7 @@ std::vector<WallLine> close_free_ends(const cloud::Cloud& cloud, double floor_m,
   std::vector<WallDoor> at_ends = doors_at_free_ends(plan.walls, plan.doors);
   find_far_sides(plan.walls, at_ends);
   std::vector<WallLine> closings;
+
   for (const WallDoor& door : at_ends) {
     std::vector<WallDoor> measured{door};
     measure_doors(cloud, floor_m, measured);
@@ -104,12 +109,14 @@ std::vector<WallLine> close_free_ends(const cloud::Cloud& cloud, double floor_m,
       return (other.jambs[0] + other.jambs[1] - m.jambs[0] - m.jambs[1]).norm() <
              2.0 * (kSame_m + other.depth_m());
     });
+
     if (!again && m.jamb_seen[0] && m.jamb_seen[1] && m.width_m > kNarrowestDoor_m) {
       plan.doors.push_back(m);
     } else {
       closings.push_back(closing_of(door));
     }
   }
+
   return closings;
 }
 
@@ -149,16 +156,19 @@ core::Result<WallPlan> find_walls(MapSource& source) {
   const double cut_m = source.options().cut_m;
   const cloud::Cloud& points = *(*cloud)->cloud;
   WallPlan plan;
+
   plan.walls = wall_sides(points, floor_m, cut_m, source.executor());
   drop_low_furniture(plan.walls);
   std::vector<WallRaster> rasters = rasters_of(plan.walls, points, floor_m);
   FreeSpace space(box_of(plan.walls), floor_m);
+
   if (source.has_store()) {
     auto seen = for_each_view(source, [&](const ViewRays& rays) -> core::Result<void> {
       space.add(rays);
       source.executor().parallel_for(rasters.size(), [&](std::size_t i) { rasters[i].add_rays(rays); });
       return {};
     });
+
     if (!seen) return tl::unexpected(seen.error());
     plan.rays_known = true;
   }
@@ -168,6 +178,7 @@ core::Result<WallPlan> find_walls(MapSource& source) {
   constexpr double kLintel_m = 2.0;
   const Cut cut{cut_m, std::max(0.25, cut_m - 0.3),
                 std::clamp(cut_m + 0.3, 0.0, std::max(kLintel_m, cut_m + 0.1)), plan.rays_known};
+
   cut_sides(plan.walls, rasters, cut);
   if (plan.walls.empty()) return tl::unexpected(no_wall_error(source, **cloud));
 
@@ -180,6 +191,7 @@ core::Result<WallPlan> find_walls(MapSource& source) {
     const auto front = std::make_shared<const WallRaster>(std::move(raster));
     fronts.push_back({front, front});
   }
+
   bridge_gaps(plan.walls, fronts, cut);
   fit_sides(points, floor_m, source.executor(), plan.walls);
   join_corners(plan.walls);
@@ -198,16 +210,19 @@ core::Result<WallPlan> find_walls(MapSource& source) {
   plan.doors.insert(plan.doors.end(), more.begin(), more.end());
   find_far_sides(plan.walls, plan.doors);
   measure_doors(points, floor_m, plan.doors);
+
   if (plan.rays_known) {
     const std::vector<WallLine> closings = close_free_ends(points, floor_m, plan);
     plan.rooms = rooms_in(box_of(plan.walls), plan.walls, closings, plan.doors, space);
   } else {
     plan.rooms = rooms_of(plan.walls);
   }
+
   set_thickness(plan.walls);
   plan.furniture = furniture_outlines(points, floor_m, plan.walls);
   measure_heights(points, floor_m, plan.rooms);
   move_plan((*cloud)->shift.head<2>(), plan);
+
   return plan;
 }
 

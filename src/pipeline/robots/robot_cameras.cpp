@@ -131,6 +131,7 @@ void RobotCameras::use(std::size_t robot, bool again, std::unique_ptr<mapping::S
     if (id.index >= pictures_)
       end = std::min(end, static_cast<std::size_t>(slam->map().keyframe(id).frame_index));
   }
+
   const auto read = [&](std::size_t index) -> std::optional<sensor::RgbdFrame> {
     if (pictures == nullptr || index >= end) return std::nullopt;
     auto frame = pictures->read(index);
@@ -148,6 +149,7 @@ void RobotCameras::use(std::size_t robot, bool again, std::unique_ptr<mapping::S
       auto features = services_->features(*frame, number);
       return std::pair(std::move(*frame), std::move(features));
     };
+
     pass.begin = [&] {
       auto begun = begin_(robots_[robot]);
       begun->set_camera(camera);
@@ -161,6 +163,7 @@ void RobotCameras::use(std::size_t robot, bool again, std::unique_ptr<mapping::S
       return;
     }
   }
+
   slam->recalibrate(camera, [&read](std::int64_t index) { return read(static_cast<std::size_t>(index)); });
 }
 
@@ -172,6 +175,7 @@ void RobotCameras::estimate_finished(Slams& slams) {
     if (!waiting_.empty()) cameras_ = given_;
     for (CameraRefinement& camera : cameras_) camera.asked_at(-1);
     waiting_.assign(waiting_.size(), false);
+
     answered_ = false;
   }
 
@@ -184,6 +188,7 @@ void RobotCameras::estimate_finished(Slams& slams) {
       use(r, !answered_ && i == 0, slam);
     }
   }
+
   tell();
   for (const Json& pair : camera_pairs(robots_)) log_->info(pair.at("text").get<std::string>());
 }

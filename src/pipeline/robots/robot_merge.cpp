@@ -49,21 +49,26 @@ std::string left_out(const std::vector<RobotMap>& parts, const std::vector<std::
   // Robots are named once, and those of which a component was used are not left out.
   std::string names;
   std::set<std::int32_t> known;
+
   for (const std::size_t p : used) {
     for (const RobotInfo& robot : parts[p].robots) known.insert(robot.number);
   }
+
   for (const RobotMap& part : parts) {
     if (known.insert(part.robots.front().number).second) names += (names.empty() ? "" : ", ") + part.name;
   }
+
   if (names.empty()) return {};
   std::string text = fmt::format("{} of {} maps do not connect and are left out: {}",
                                  parts.size() - used.size(), parts.size(), names);
+
   for (const RobotMerge& merge : merges) {
     const mapping::MergeEvidence& e = merge.evidence;
     if (e.accepted) continue;
     text += fmt::format("; {} with {}: {} ({} look-alikes, {} tried, {} verified)", merge.b, merge.a,
                         e.refused, e.candidates, e.tried, e.consistency.verified);
   }
+
   return text;
 }
 
@@ -113,6 +118,7 @@ Json section_of(const RobotMerge& merge) {
   const mapping::MergeEvidence& e = merge.evidence;
   const mapping::PairTotals totals = e.totals();
   Json refused = Json::object();
+
   for (const auto& [why, count] : e.refused_pairs) refused[why] = count;
 
   Json entry = {{"a", merge.a},

@@ -79,6 +79,7 @@ void set_verdict(std::vector<Doubt> doubts, Json& summary) {
   const auto apart =
       std::count_if(list.begin(), list.end(), [](const Json& c) { return !c.at("joined").get<bool>(); });
   const Json& frames = summary.at("frames");
+
   const double period_s = frames.at("period_s"), lost = frames.at("lost"), blind = frames.at("blind");
   const double tracked = frames.at("tracked"), seen = frames.at("read").get<double>() - blind;
 
