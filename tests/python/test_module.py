@@ -125,6 +125,23 @@ class Mapping(Folder):
         self.assertLess(kept[0], kept[1])
         self.assertNotEqual(maps[0], maps[1])
 
+    def test_a_camera_is_located_in_a_map_that_stays_as_it_is(self):
+        result = plumbline.map(self.recording, self.work / "known", end=1.5)
+        before = {file: file.read_bytes() for file in result.folder.rglob("*") if file.is_file()}
+        found = plumbline.localize(result, self.recording, self.work / "found", threads=1)
+        self.assertEqual(len(found.located), 60)
+        self.assertGreater(found.located.sum(), 45)
+        self.assertEqual(len(found.trajectory.stamps), found.located.sum())
+        self.assertTrue(np.all(np.isfinite(found.sigma_position) == found.located))
+        self.assertTrue(all((reason == "") == located for reason, located in zip(found.reasons, found.located)))
+        self.assertEqual(found.reason, "")
+        common = np.isin(found.trajectory.stamps, result.trajectory.stamps)
+        apart = found.trajectory.poses[common][:, :3, 3] - result.trajectory.poses[: common.sum()][:, :3, 3]
+        self.assertLess(np.abs(apart).max(), 0.02)
+        self.assertEqual(before, {file: file.read_bytes() for file in result.folder.rglob("*") if file.is_file()})
+        with self.assertRaisesRegex(plumbline.InputError, "nowhere"):
+            plumbline.localize(self.work / "nowhere", self.recording, self.work / "lost")
+
     def test_one_after_the_other_gives_the_same(self):
         """Whoever waits for each pose before the next frame, with one thread."""
         recording = plumbline.open(self.recording, raw=True)

@@ -30,7 +30,8 @@ const Keys kAdvanced{
          "landmark.max_turn_rate fuse fuse.keyframes fuse.radius triangulate.keyframes bundle.max_iterations "
          "match.aligned_sigma bundle.line_sigma bundle.depth_factor edges.min_overlap surface.min_depth "
          "loops.robust loops.bundle loops.max_alternative vocabulary.branching vocabulary.levels "
-         "verify.min_overlap verify.max_contradiction verify.rounds")},
+         "verify.min_overlap verify.max_contradiction verify.rounds camera.pictures")},
+    {"localize", keys_in("min_features min_found place.candidates place.min_score place.max_alternative")},
     {"merge", keys_in("few_extent prior_shared prior_wrong verifications lag")},
     {"cloud", keys_in("free_space_every smooth_position base")},
     {"refine",
@@ -51,6 +52,14 @@ const Keys kInternal{
          "verify.min_cells keyframe.cone_balance keyframe.cone_scaled keyframe.urgent thumbnails "
          "motion_prior pnp_start landmark.by_keyframes bundle.depth_rows "
          "solver.depth_rows verify.depth_rows verify.align verify.joint match.min_line_ratio")},
+    {"localize",
+     keys_in("depth align_stamps thumbnails motion_prior pnp_start readout min_inliers min_surface "
+             "match.max_hamming match.ratio match.align match.aligned_sigma match.max_line_hamming "
+             "match.min_line_ratio local.keyframes local.surface_keyframes local.voxel local.overlap_angle "
+             "solver.point_weight solver.line_weight solver.depth_rows solver.plane_weight "
+             "solver.photometric_weight vocabulary.branching vocabulary.levels vocabulary.split "
+             "verify.min_inliers verify.min_found verify.min_evidence verify.min_cells verify.min_overlap "
+             "verify.max_contradiction verify.rounds verify.depth_rows verify.joint verify.align")},
     {"merge",
      keys_in("min_span min_turn max_translation max_rotation drift "
              "robust vocabulary.branching vocabulary.levels vocabulary.split "

@@ -103,7 +103,8 @@ std::string time_text(const Json& summary) {
 std::string text_of(const Json& summary) {
   const Json& frames = summary.at("frames");
   const auto count = [](const Json& number) { return number.get<std::size_t>(); };
-  std::string text = sentence_of(summary) + "\n";
+  std::string text = sentence_of(summary);
+  if (!text.empty()) text += "\n";
 
   if (summary.at("stopped").get<bool>()) {
     text +=

@@ -66,6 +66,10 @@ std::string told(const Json& summary) {
 
 void set_verdict(std::vector<Doubt> doubts, Json& summary) {
   const std::string reason = gravest(doubts);
+  summary["trustworthy"] = reason.empty();
+  summary["reason"] = reason;
+  if (!summary.contains("components")) return;  // no map was made: a camera was located in one
+
   Json shape = Json::array(), coverage = Json::array();
   for (const Doubt& doubt : doubts) (is_of_coverage(doubt) ? coverage : shape).push_back(doubt.text);
   const bool trusted = shape.empty();
@@ -99,8 +103,6 @@ void set_verdict(std::vector<Doubt> doubts, Json& summary) {
                {"reasons", std::move(coverage)}}},
              {"unchecked", unchecked_of(summary)}};
 
-  summary["trustworthy"] = reason.empty();
-  summary["reason"] = reason;
   verdict["sentence"] = told(summary);
 }
 

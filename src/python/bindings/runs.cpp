@@ -29,7 +29,7 @@ std::unique_ptr<Background> start_map(const std::vector<std::string>& inputs, co
                                       const std::string& format, double from_s, std::optional<double> to_s,
                                       int every, const std::string& poses,
                                       const std::map<std::string, std::string>& topics, int threads,
-                                      bool replace, bool resume) {
+                                      bool replace, bool resume, const fs::path& known_map) {
   pipeline::MapRequest request;
   fill(request, output, pipeline, overrides, pipelines, replace);
   if (inputs.empty()) throw Failure({core::ErrorKind::kUsage, "inputs: name a recording"});
@@ -37,6 +37,7 @@ std::unique_ptr<Background> start_map(const std::vector<std::string>& inputs, co
   request.others.assign(inputs.begin() + 1, inputs.end());
   request.open = open_options(pipelines, camera, format, from_s, to_s, every, poses, topics);
   request.resume = resume;
+  request.known_map = known_map;
 
   return std::make_unique<Background>(
       [request, threads](core::Log& log, const core::StopToken& stop, const pipeline::Progress& progress) {
@@ -173,7 +174,7 @@ void add_runs(py::module_& module) {
   module.def("start_map", &start_map, py::arg("inputs"), py::arg("output"), py::arg("pipeline"),
              py::arg("overrides"), py::arg("pipelines"), py::arg("camera"), py::arg("format"),
              py::arg("from_s"), py::arg("to_s"), py::arg("every"), py::arg("poses"), py::arg("topics"),
-             py::arg("threads"), py::arg("replace"), py::arg("resume"));
+             py::arg("threads"), py::arg("replace"), py::arg("resume"), py::arg("known_map"));
   module.def("start_fuse", &start_fuse, py::arg("maps"), py::arg("output"), py::arg("pipeline"),
              py::arg("overrides"), py::arg("pipelines"), py::arg("anchor"), py::arg("threads"),
              py::arg("replace"));

@@ -139,6 +139,7 @@ def start_map(
     threads: int,
     replace: bool,
     resume: bool,
+    known_map: str,
 ) -> Background: ...
 def start_fuse(
     maps: List[str],

@@ -6,6 +6,7 @@ import csv
 import functools
 import json
 import os
+from io import open as open_text
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Dict, List, NamedTuple, Optional, Tuple
@@ -77,6 +78,46 @@ def _matrices(*columns: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 def _name(field: str) -> str:
     """The text of a field of our tables: names that a spreadsheet would take for a formula have an apostrophe in front."""
     return field[1:] if field.startswith("'") else field
+
+
+class Localization:
+    """Where a recording's camera was in a map: the folder that `localize` has written."""
+
+    def __init__(self, folder: PathLike) -> None:
+        self.folder = Path(path_of(folder, "folder"))
+        self.summary: Dict[str, Any] = dict(json.loads(_core.read_json(self.folder / "summary.json")))
+        if "localized" not in self.summary:
+            raise _core.InputError(f"{self.folder}: is no result of localize")
+        with open_text(self.folder / "frames.csv", encoding="utf-8", newline="") as file:
+            self._rows = list(csv.DictReader(file))
+
+    def __repr__(self) -> str:
+        return f"<plumbline.Localization {self.folder}>"
+
+    @functools.cached_property
+    def trajectory(self) -> Trajectory:
+        """Poses of the located frames in the frame of the map's results."""
+        return Trajectory.read(self.folder / "trajectory.txt")
+
+    @property
+    def located(self) -> npt.NDArray[np.bool_]:
+        """N, one for each frame of the recording."""
+        return np.array([row["state"] == "located" for row in self._rows], dtype=np.bool_)
+
+    @property
+    def sigma_position(self) -> npt.NDArray[np.float64]:
+        """N, metres, root of the trace of the covariance relative to the map around the camera; NaN: not located."""
+        return np.array([float(row["sigma_position"] or "nan") for row in self._rows], dtype=np.float64)
+
+    @property
+    def reasons(self) -> List[str]:
+        """N, why each frame was not located; "": it was."""
+        return [_name(row["reason"]) for row in self._rows]
+
+    @property
+    def reason(self) -> str:
+        """Why all of it must not be trusted: less than half of the frames were located; "": it may be."""
+        return str(self.summary.get("reason", ""))
 
 
 class Result:

@@ -15,7 +15,7 @@ from . import _core
 from ._core import Camera
 from ._paths import pipelines
 from ._recording import camera as find_camera
-from ._result import Result
+from ._result import Localization, Result
 from ._values import PathLike, overrides, path_of, tell
 
 Progress = Callable[[int, int], None]
@@ -85,10 +85,40 @@ def map(  # noqa: A001, the program's name for it
     """
     run = _core.start_map(
         _files(recording), path_of(output, "output"), path_of(pipeline, "pipeline"), overrides(options), pipelines(),
-        os.fspath(camera), format, start, end, every, poses, dict(topics or {}), threads, force, resume,
+        os.fspath(camera), format, start, end, every, poses, dict(topics or {}), threads, force, resume, "",
     )
     _finish(run, progress)
     return Result(output)
+
+
+def localize(
+    map: Union[PathLike, Result],  # noqa: A002
+    recording: PathLike,
+    output: PathLike,
+    *,
+    pipeline: PathLike = "localize",
+    camera: PathLike = "",
+    format: str = "auto",  # noqa: A002
+    start: float = 0.0,
+    end: Optional[float] = None,
+    every: int = 1,
+    topics: Optional[Mapping[str, str]] = None,
+    threads: int = 0,
+    force: bool = False,
+    progress: Optional[Progress] = None,
+    **options: Any,
+) -> Localization:
+    """Finds a recording's camera in a finished map, which stays as it is: `plumbline localize` as a call.
+
+    map  a result folder of `map` or `fuse`, its map.db, or a Result
+    """
+    known = os.fspath(map.folder) if isinstance(map, Result) else path_of(map, "map")
+    run = _core.start_map(
+        _files(recording), path_of(output, "output"), path_of(pipeline, "pipeline"), overrides(options), pipelines(),
+        os.fspath(camera), format, start, end, every, "ignore", dict(topics or {}), threads, force, False, known,
+    )
+    _finish(run, progress)
+    return Localization(output)
 
 
 def fuse(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Pipelines of users: README's tutorial word for word, includes, taps, pictures of graphs.
+// Pipelines of users: the tutorial word for word, includes, taps, pictures of graphs.
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
@@ -18,9 +18,9 @@ namespace {
 
 const fs::path kSource = PLUMBLINE_SOURCE_DIR;
 
-/// The fenced blocks of README's section of that name, without their fences.
-std::vector<std::string> blocks_of_readme(const std::string& heading) {
-  const std::string page = slurp(kSource / "README.md");
+/// The fenced blocks of the section of that name of docs/reference/commands.md, without their fences.
+std::vector<std::string> blocks_of_page(const std::string& heading) {
+  const std::string page = slurp(kSource / "docs/reference/commands.md");
   const std::size_t begin = page.find("\n## " + heading + "\n");
   if (begin == std::string::npos) return {};
   std::istringstream section(page.substr(begin + 1, page.find("\n## ", begin + 4) - begin));
@@ -39,8 +39,8 @@ std::vector<std::string> blocks_of_readme(const std::string& heading) {
 
 class Pipelines : public ProgramTest {};
 
-TEST_F(Pipelines, TheTutorialOfTheReadmeWorksWordForWord) {
-  const std::vector<std::string> blocks = blocks_of_readme("A pipeline of your own");
+TEST_F(Pipelines, TheTutorialWorksWordForWord) {
+  const std::vector<std::string> blocks = blocks_of_page("A pipeline of your own");
   ASSERT_EQ(blocks.size(), 3U);  // copy; the new end of the file; check and run
   fs::create_directory_symlink(kSource / "pipelines", path("pipelines"));
   ASSERT_EQ(std::system(("cd '" + path("").string() + "' && " + blocks[0]).c_str()), 0) << blocks[0];
