@@ -27,7 +27,7 @@ void add_publish_option(CLI::App& command, std::string& address) {
   command
       .add_option("--publish", address,
                   "Publish the growing map on ROS 2's network, for RViz and others: /tf, paths, points "
-                  "(docs/guide/inputs.md)")
+                  "(docs/reference/ros2.md)")
       ->type_name("ros2://DOMAIN");
 }
 
