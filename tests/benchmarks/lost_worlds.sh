@@ -23,7 +23,7 @@ awk '/^robots:/ {robots = 1} !robots || !/^      - / || ++places <= 5 {print} ro
   "$(dirname "$0")/../../pipelines/scenes/office.yaml" >"$home"
 
 world() { # NAME SCENE SEED EVENTS
-  [ -d "$work/$1" ] || "$program" synth "$2" -o "$work/$1" --frames "${FRAMES:-600}" --seed "$3" --events "$4" \
+  [ -d "$work/$1" ] || "$program" synth "$2" -o "$work/$1" --frames "${FRAMES:-600}" --seed "$3" ${4:+--events "$4"} \
     --reference-spacing 0.5 -q
 }
 result() { # NAME HIDDEN: frames of the recording in which nothing can be seen
