@@ -2,6 +2,7 @@
 #pragma once
 
 // A small TUM folder with exact truth: a camera slides along a painted wall with a box before it.
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iomanip>
@@ -14,6 +15,7 @@ namespace plumbline::integration {
 
 struct WallRecording {
   int frames = 12;
+  int moving = 1000000;          ///< frames before the camera stops
   double depth_scale = 5000.0;   ///< what the images are written with
   double camera_scale = 5000.0;  ///< what camera.yaml says
   double depth_offset_s = 0.0;   ///< of the depth stamps
@@ -71,9 +73,10 @@ inline void write_wall(const std::filesystem::path& folder, const WallRecording&
   for (std::ofstream* list : {&rgb, &depth, &truth}) *list << std::fixed << std::setprecision(6);
   for (int f = 0; f < recording.frames; ++f) {
     const double stamp = 10.0 + f / 30.0;
-    cv::Mat color = wall(cv::Rect(f * kStep_px, 0, kWidth, kHeight)).clone();
+    const int step = std::min(f, recording.moving);
+    cv::Mat color = wall(cv::Rect(step * kStep_px, 0, kWidth, kHeight)).clone();
     cv::Mat metres(kHeight, kWidth, CV_64FC1, cv::Scalar(kWall_m));
-    const cv::Rect place(120 - f * kStep_px * 4 / 3, 80, 80, 80);  // nearer, so faster
+    const cv::Rect place(120 - step * kStep_px * 4 / 3, 80, 80, 80);  // nearer, so faster
     const cv::Rect seen = place & cv::Rect(0, 0, kWidth, kHeight);
     if (!seen.empty()) {
       box(seen - place.tl()).copyTo(color(seen));
@@ -85,7 +88,7 @@ inline void write_wall(const std::filesystem::path& folder, const WallRecording&
     cv::imwrite((folder / "depth" / frame_name(f)).string(), raw);
     rgb << stamp << " rgb/" << frame_name(f) << "\n";
     depth << stamp + recording.depth_offset_s << " depth/" << frame_name(f) << "\n";
-    truth << stamp << " " << f * kStep_px * kWall_m / kFocal << " 0 0 0 0 0 1\n";
+    truth << stamp << " " << step * kStep_px * kWall_m / kFocal << " 0 0 0 0 0 1\n";
   }
   write_camera(folder / "camera.yaml", recording);
 }

@@ -43,6 +43,7 @@ struct TrackedFrame {
   maps::FrameId frame;        ///< its number on the robot's path; invalid: it has no pose
   double stamp = 0.0;         ///< seconds
   FrameRow row;
+  bool still = false;  ///< the camera has stood still for a second, and nothing moves before it
   geometry::Rigid3 depth_from_camera;   ///< motion between the stamps of colour and depth
   std::optional<maps::FramePose> pose;  ///< none before the map began, or where there is no map
   /// Pose in the present map, if there is an observer; none: lost.

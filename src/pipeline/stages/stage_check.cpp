@@ -87,7 +87,7 @@ class CheckStage : public Stage {
 
   core::Result<void> process(StageIo& io) override {
     const auto track = io.input<TrackedFrame>("track");
-    if (!enabled_ || !track->frame.valid()) return {};
+    if (!enabled_ || !track->frame.valid() || track->still) return {};
     keep(*io.input<sensor::RgbdFrame>("frame"), track->robot);
     return {};
   }

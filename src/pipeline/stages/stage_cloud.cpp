@@ -92,6 +92,9 @@ class CloudStage : public Stage {
     const std::int32_t robot = recordings_->robot_of(io.frame());
     const std::size_t number = recordings_->frame_of(io.frame());
 
+    // The view of a camera that stands still is known after its first second.
+    if (track->still && !track->keyframe.valid()) return {};
+
     // The last frame may show surface that no other frame does, if the camera was still moving.
     const bool gives_cloud =
         track->keyframe.valid() ||

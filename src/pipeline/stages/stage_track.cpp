@@ -19,6 +19,7 @@
 #include "robots/observed_way.hpp"
 #include "robots/robot_cameras.hpp"
 #include "robots/robot_components.hpp"
+#include "robots/still_camera.hpp"
 #include "robots/tracking_sections.hpp"
 #include "stages/stages.hpp"
 #include "summary/sections.hpp"
@@ -31,6 +32,11 @@ struct Unstored {
   maps::MapRevision since;  ///< changes from here on
   bool new_camera = false;  ///< since its last keyframe
 };
+
+/// camera_from_world of a frame.
+geometry::Rigid3 pose_in(const maps::Map& map, const maps::FramePose& frame) {
+  return frame.camera_from_reference * map.camera_from_world(frame.reference);
+}
 
 class TrackStage : public Stage {
  public:
@@ -59,6 +65,7 @@ class TrackStage : public Stage {
     cameras_.emplace(*context.input.recordings, refine_, pictures_, begin, context);
     unstored_.resize(slams_.size());
     observed_.resize(slams_.size());
+    still_.resize(slams_.size());
     if (context.resumed != nullptr) restore(*context.resumed);
     stored_robots_ = cameras_->robots();
     stored_news_ = cameras_->news();
@@ -94,6 +101,9 @@ class TrackStage : public Stage {
 
     if (tracked->pose && tracked->pose->tracked) {
       tracked->frame = {robot.number, static_cast<std::int32_t>(poses)};
+      tracked->still = still_[number].stands_still(pose_in(slam.map(), *tracked->pose), frame->depth);
+    } else {
+      still_[number].lose();
     }
 
     if (report.keyframe.valid()) add_map(slam, number, *tracked);
@@ -278,6 +288,7 @@ class TrackStage : public Stage {
   Slams slams_;
   std::optional<RobotCameras> cameras_;
   std::vector<ObservedWay> observed_;     ///< by robot
+  std::vector<StillCamera> still_;        ///< by robot
   std::vector<Unstored> unstored_;        ///< by robot
   std::vector<RobotInfo> stored_robots_;  ///< it learns of a robot's camera with its next keyframe
   int stored_news_ = 0;

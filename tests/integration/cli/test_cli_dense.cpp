@@ -6,6 +6,7 @@
 #include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/cloud/io/ply.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
+#include "plumbline/maps/store.hpp"
 #include "program.hpp"
 #include "wall_recording.hpp"
 
@@ -93,6 +94,23 @@ TEST_F(Dense, KnownPosesAreTakenAtTheMomentOfTheDepthImage) {
   };
   const double speed = kStep_px * kWall_m / kFocal * 30.0;  // m/s
   EXPECT_NEAR(box_at("later") - box_at("together"), speed * later.depth_offset_s, 0.002);
+}
+
+TEST_F(Dense, ACameraThatStandsStillAddsNothing) {
+  const auto clouds_between_keyframes = [&](int frames) {
+    WallRecording stops;
+    stops.frames = frames;
+    stops.moving = 12;
+    const std::string name = std::to_string(frames);
+    write_wall(path(name), stops);
+    EXPECT_EQ(run("map " + name + " -o out" + name + " -q --set output.views= --set fuse.up=none").code, 0);
+    const auto store = maps::StoreReader::open(path("out" + name + "/map.db"));
+    EXPECT_TRUE(store && store->frame_cloud_ids());
+    return store && store->frame_cloud_ids() ? store->frame_cloud_ids()->size() : 0;
+  };
+  const std::size_t soon = clouds_between_keyframes(45);
+  EXPECT_GT(soon, 10U);  // every third frame
+  EXPECT_LE(clouds_between_keyframes(90), soon);
 }
 
 TEST_F(Dense, WhoWalksThroughLeavesNoGhost) {
