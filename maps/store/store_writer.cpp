@@ -134,6 +134,8 @@ struct StoreWriter::Impl {
   /// Makes later rounds write keyframes and edges again if a camera has changed.
   void put_robots_of_map(const std::vector<RobotInfo>& all);
   void put_seen(FrameId frame, const SeenPoints& seen);
+  /// Before all frames of a robot are written again: what they saw are landmarks of its earlier map.
+  void erase_frames(std::int32_t robot);
   void put_map_row(const MapChanges& map, std::int32_t robot);
   void put_cloud(const StoreCloud& cloud);
   void put_picture(const StorePicture& picture);
@@ -222,6 +224,11 @@ void StoreWriter::Impl::put_map_row(const MapChanges& map, std::int32_t robot) {
   maps.begin_round();
   maps.put({std::max(robot, 0), 0}, encoded(row));
   if (robot < 0) maps.delete_unmarked();
+}
+
+void StoreWriter::Impl::erase_frames(std::int32_t robot) {
+  frame_lists[robot].clear();
+  Statement(*database, "DELETE FROM seen WHERE robot = ?").bind(1, robot).run();
 }
 
 void StoreWriter::Impl::put_cloud(const StoreCloud& cloud) {
@@ -347,6 +354,8 @@ core::Result<void> StoreWriter::add_keyframe(const Map& map, KeyframeId keyframe
 
 core::Result<void> StoreWriter::add(const StoreStep& step) {
   return impl_->transact([&] {
+    if (step.frames_anew) impl_->erase_frames(step.robot);
+
     std::map<std::int32_t, std::size_t> before;
     for (const FramePose& pose : step.frames) {
       std::vector<FramePose>& list = impl_->frame_lists[pose.reference.robot];

@@ -467,8 +467,8 @@ std::shared_ptr<const maps::SeenPoints> Slam::seen_points() const {
   const tracking::TrackResult& track = last_track_;
   if (track.features == nullptr || track.points.empty()) return nullptr;
 
-  // All of the first 2000 frames are kept, every second of the next 2000, every fourth of the next 4000, and so on: a
-  // long run keeps little more than a short one.
+  // All of the first 2000 frames are kept, every second of the next 2000, every fourth of the next 4000, and
+  // so on: a long run keeps little more than a short one.
   std::size_t every = 1;
   while (frame_poses().size() >= 2000 * every) every *= 2;
   if (frame_poses().size() % every != 0) return nullptr;

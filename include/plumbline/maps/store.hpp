@@ -131,6 +131,7 @@ struct StoreStep {
   std::int32_t robot = -1;
   std::shared_ptr<const MapChanges> map;  ///< since the last step's of this robot
   std::vector<FramePose> frames;          ///< frames since then
+  bool frames_anew = false;               ///< `frames` are all of `robot`: its map was made anew
   std::vector<std::string> log;           ///< lines that came since
   std::vector<StoreCloud> clouds;
   std::vector<StorePicture> pictures = {};

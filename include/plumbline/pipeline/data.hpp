@@ -53,6 +53,8 @@ struct TrackedFrame {
   std::shared_ptr<const maps::Map> map;  ///< for several robots: the map at this keyframe
   /// With a keyframe: all robots, if there are news of a camera since the last one. Null: there are none.
   std::shared_ptr<const std::vector<RobotInfo>> robots;
+  /// With the first keyframe after the map was made anew: all frames of the robot, relative to the new map.
+  std::shared_ptr<const std::vector<maps::FramePose>> frames_anew;
 };
 
 /// The map of one robot when its tracking has ended, or a finished map of one robot or several.

@@ -130,6 +130,10 @@ class StoreStage : public Stage {
     }
     step.map = track.changes;
     step.robots = track.robots;
+    if (track.frames_anew != nullptr) {
+      step.frames = *track.frames_anew;
+      step.frames_anew = true;
+    }
     step.clouds = std::move(clouds);
     return writer_->add(step);
   }

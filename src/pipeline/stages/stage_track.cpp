@@ -237,7 +237,10 @@ class TrackStage : public Stage {
     if (!new_camera && !news) return;
     for (std::size_t r = 0; r < stored_robots_.size(); ++r)
       stored_robots_[r].estimate = cameras_->robots()[r].estimate;
-    if (new_camera) stored_robots_[number].versions = cameras_->robots()[number].versions;
+    if (new_camera) {
+      stored_robots_[number].versions = cameras_->robots()[number].versions;
+      tracked.frames_anew = std::make_shared<std::vector<maps::FramePose>>(slam.frame_poses());
+    }
     tracked.robots = std::make_shared<std::vector<RobotInfo>>(stored_robots_);
   }
 

@@ -106,6 +106,34 @@ TEST(StoreSteps, EachLeavesTheMapInEveryBit) {
   EXPECT_FALSE(contents.complete);
 }
 
+TEST(StoreSteps, AMapThatWasMadeAnewBringsItsFramesAnew) {
+  const StoreFolder folder;
+  StoreWorld world(24);
+  Follower follower(world);
+  auto writer = StoreWriter::create(folder.file(), header_of(world.camera));
+  ASSERT_TRUE(writer) << writer.error().message;
+
+  // Frames saw landmarks of a first map.
+  StoreStep first = follower.step();
+  for (FramePose& frame : first.frames) {
+    frame.seen = std::make_shared<SeenPoints>(SeenPoints{0.0, {{core::PointId{0, 7}, {1.0F, 2.0F}, 3.0F}}});
+  }
+  ASSERT_TRUE(writer->add(first));
+  ASSERT_NE(load_map(folder.file())->frames.front().seen, nullptr);
+
+  StoreStep anew = follower.step();
+  anew.robot = 0;
+  anew.frames = world.frames;
+  anew.frames_anew = true;
+  for (FramePose& frame : anew.frames) frame.camera_from_reference.translation.x() += 0.01;
+  ASSERT_TRUE(writer->add(anew));
+
+  const auto stored = load_map(folder.file());
+  ASSERT_TRUE(stored) << stored.error().message;
+  ASSERT_TRUE(same_all(stored->frames, anew.frames));
+  for (const FramePose& frame : stored->frames) EXPECT_EQ(frame.seen, nullptr);
+}
+
 TEST(StoreSteps, ChangesAreFewWhenLittleChanged) {
   StoreWorld world(22);
   for (int i = 0; i < 30; ++i) world.step();
