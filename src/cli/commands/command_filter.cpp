@@ -10,9 +10,11 @@
 #include <vector>
 
 #include "app.hpp"
+#include "option_flags.hpp"
 #include "plumbline/cloud/columns.hpp"
 #include "plumbline/cloud/filters/filter_chain.hpp"
 #include "plumbline/cloud/filters/filter_plugin.hpp"
+#include "plumbline/cloud/filters/tiled_filter.hpp"
 #include "plumbline/core/text.hpp"
 #include "plumbline/maps/output_check.hpp"
 #include "plumbline/maps/result_folder.hpp"
@@ -23,9 +25,21 @@ namespace {
 
 namespace fs = std::filesystem;
 
+struct TileOptions {
+  double tiles_m = 0.0;  ///< edge length; 0: the whole cloud at once
+  void declare(core::OptionTable& table) {
+    table.number(
+        "tiles", tiles_m, {0.0, 10000.0}, "m",
+        "Filter a cloud that memory does not hold in tiles of this edge length (10m): filters must decide "
+        "by a point's neighbours, files be binary PLY; 0: the whole cloud at once");
+  }
+};
+
 struct FilterRequest {
   std::string chain;
   std::vector<fs::path> files;  ///< inputs, then the output
+  TileOptions tiles;
+  OptionFlags flags;
 };
 
 core::Result<cloud::FilterChain> load_chain(const std::string& name, const Session& session) {
@@ -110,7 +124,33 @@ core::Result<void> something_left(const cloud::FilterChain& chain,
   return {};
 }
 
-core::Result<void> filter(const FilterRequest& request, Session& session) {
+/// The chain tile by tile.
+core::Result<void> filter_tiles(const FilterRequest& request, const cloud::FilterChain& chain,
+                                Session& session) {
+  const fs::path& output = request.files.back();
+  if (core::ending_of(output) != ".ply")
+    return core::usage_error(output.string() + ": with --tiles clouds are written as .ply");
+  const std::vector<fs::path> inputs(request.files.begin(), request.files.end() - 1);
+
+  cloud::CloudFrame frame = maps::frame_of_cloud(inputs.front(), cloud::frame_of_ply(inputs.front()));
+  Console& console = session.console();
+  const auto report = cloud::filter_in_tiles(
+      chain, inputs, output, request.tiles.tiles_m, frame, &session.executor(),
+      [&console](std::size_t done, std::size_t total) { console.progress(done, total, "tiles"); });
+  console.end_progress();
+  if (!report) return tl::unexpected<core::Error>(report.error());
+
+  if (!session.quiet) {
+    print("{} of {} points, in {} tiles of at most {} points with their margins\n", report->points_out,
+          report->points_in, report->tiles, report->fullest);
+  }
+  if (report->points_out > 0) return {};
+  return core::failure(core::ErrorKind::kUntrustworthy,
+                       fmt::format("chain {}: no point is left", chain.name()));
+}
+
+core::Result<void> filter(FilterRequest& request, Session& session) {
+  if (auto given = request.flags.apply(); !given) return given;
   const auto chain = load_chain(request.chain, session);
   if (!chain) return tl::unexpected<core::Error>(chain.error());
 
@@ -119,6 +159,7 @@ core::Result<void> filter(const FilterRequest& request, Session& session) {
   context.executor = &session.executor();
   if (auto fit = check_outputs(request, *chain); !fit) return fit;
   if (auto fit = chain->ready(context); !fit) return fit;
+  if (request.tiles.tiles_m > 0.0) return filter_tiles(request, *chain, session);
 
   cloud::CloudColumns columns;
   cloud::CloudFrame frame;
@@ -196,6 +237,7 @@ void add_filter(CLI::App& app, Session& session) {
       ->required()
       ->type_name("IN... OUT")
       ->expected(2, -1);
+  request->flags.add(*command, request->tiles);
   add_progress_option(*command, session);
   add_plugin_option(*command, session);
 

@@ -168,6 +168,20 @@ core::Result<void> FilterChain::ready(const FilterContext& context) const {
   return {};
 }
 
+core::Result<double> FilterChain::reach_m() const {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < filters_.size(); ++i) {
+    const auto reach = filters_[i].filter->reach_m();
+    if (!reach) {
+      return tl::unexpected<core::Error>(
+          at(i, {core::ErrorKind::kUsage,
+                 "needs the whole cloud, not tiles; leave --tiles out, or run it by itself"}));
+    }
+    sum += *reach;
+  }
+  return sum;
+}
+
 std::vector<std::string> FilterChain::writes() const {
   std::vector<std::string> files;
   for (const Step& step : filters_) {

@@ -37,6 +37,7 @@ class ColorFilter : public Filter {
     const double most = is_byte() ? 255.0 : channel_ == "hue" ? 360.0 : 1.0;
     return min_ <= most ? "" : fmt::format("min ({}) is more than {} can be ({})", min_, channel_, most);
   }
+  [[nodiscard]] std::optional<double> reach_m() const override { return 0.0; }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
     if (is_byte()) {
       const std::vector<bool> met =
@@ -74,6 +75,7 @@ class CurvatureFilter : public Filter {
   std::string check() const override {
     return min_ < max_ ? "" : fmt::format("min ({}) must be less than max ({})", min_, max_);
   }
+  [[nodiscard]] std::optional<double> reach_m() const override { return 0.0; }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
     // PCL's comparison treats NaN as equal to anything.
     const CloudConstPtr known =

@@ -27,6 +27,7 @@ class CropBoxFilter : public Filter {
     }
     return "";
   }
+  [[nodiscard]] std::optional<double> reach_m() const override { return 0.0; }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     pcl::CropBox<Point> crop;
     crop.setMin(corner(min_m_, context.shift));
@@ -62,6 +63,7 @@ class PassThroughFilter : public Filter {
   std::string check() const override {
     return min_ < max_ ? "" : fmt::format("min ({}) must be less than max ({})", min_, max_);
   }
+  [[nodiscard]] std::optional<double> reach_m() const override { return 0.0; }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     if (!column_.empty()) return by_column(*input, context);
     pcl::PassThrough<Point> pass;

@@ -170,6 +170,8 @@ class GridFilter : public Filter {
   /// `points`: finite, not empty.
   virtual CloudPtr resample(const CloudConstPtr& points) const = 0;
   [[nodiscard]] float leaf() const { return static_cast<float>(leaf_m_); }
+  /// Cells are numbered from the origin, the same in every part of a cloud.
+  [[nodiscard]] double cell_diagonal_m() const { return leaf_m_ * std::sqrt(3.0); }
 
  private:
   double leaf_m_ = 0.01;
@@ -181,6 +183,7 @@ class VoxelGridFilter : public GridFilter {
     GridFilter::declare(table);
     table.integer("min_points", min_points_, {1, 100000}, "", "Remove cells with fewer points");
   }
+  [[nodiscard]] std::optional<double> reach_m() const override { return cell_diagonal_m(); }
   CloudPtr resample(const CloudConstPtr& points) const override {
     pcl::VoxelGrid<Point> grid;
     grid.setLeafSize(leaf(), leaf(), leaf());
@@ -210,6 +213,7 @@ class ApproximateVoxelGridFilter : public GridFilter {
 
 class UniformSamplingFilter : public GridFilter {
  public:
+  [[nodiscard]] std::optional<double> reach_m() const override { return cell_diagonal_m(); }
   /// PCL gives the points in the order of a hash table; here they stay in the order of the input.
   CloudPtr resample(const CloudConstPtr& points) const override {
     pcl::UniformSampling<Point> sampling(true);

@@ -21,6 +21,9 @@ class NormalsFilter : public Filter {
                ? "neighbours must be 0 or at least 3: a plane has three points"
                : "";
   }
+  [[nodiscard]] std::optional<double> reach_m() const override {
+    return neighbours_ == 0 ? std::optional(radius_m_) : std::nullopt;
+  }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     const CloudPtr points = finite_list(*input);
     if (points->empty()) return points;

@@ -37,6 +37,7 @@ class RadiusOutlierFilter : public Filter {
     table.number("radius", radius_m_, {1e-4, 100.0}, "m", "Radius within which neighbours are counted");
     table.integer("min_neighbours", min_neighbours_, {1, 100000}, "", "Remove points with fewer neighbours");
   }
+  [[nodiscard]] std::optional<double> reach_m() const override { return radius_m_; }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& /*context*/) const override {
     const CloudConstPtr points = finite_list(input);
     if (points->size() <= static_cast<std::size_t>(min_neighbours_)) return like(*input);

@@ -58,6 +58,9 @@ class Filter {
   [[nodiscard]] virtual core::Result<void> ready(const FilterContext& /*context*/) const { return {}; }
   /// The file that it writes, "" if none: no two filters may write the same.
   [[nodiscard]] virtual std::string writes() const { return ""; }
+  /// Distance within which other points decide about a point, metres: so wide a margin around a part of the
+  /// cloud gives the part the points that the whole would. None: the whole cloud decides.
+  [[nodiscard]] virtual std::optional<double> reach_m() const { return std::nullopt; }
   /// The input is never changed; returning it as it came is not allowed. Filters that only choose points keep
   /// an organised cloud organised (rejected points become NaN). Const and free of hidden state: one filter
   /// may run on several threads. Errors: kUsage when the options do not fit this cloud (message without the

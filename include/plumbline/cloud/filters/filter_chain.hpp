@@ -54,6 +54,8 @@ class FilterChain {
   /// Problem that keeps the chain from running, such as a missing file of merge; nothing is read or written
   /// yet.
   [[nodiscard]] core::Result<void> ready(const FilterContext& context = {}) const;
+  /// Filter::reach_m() of all filters together. Errors (kUsage) name a filter that needs the whole cloud.
+  [[nodiscard]] core::Result<double> reach_m() const;
   /// The files that its filters write (tee), in their order.
   [[nodiscard]] std::vector<std::string> writes() const;
 

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/cloud/filters/tiled_filter.hpp"
+
+#include <fmt/format.h>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "chains/ply_tiles.hpp"
+#include "io/cloud_table.hpp"
+#include "plumbline/cloud/columns.hpp"
+#include "plumbline/core/output_file.hpp"
+#include "plumbline/core/text.hpp"
+
+namespace plumbline::cloud {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder beside the output that is gone when this is.
+class TileFolder {
+ public:
+  explicit TileFolder(const fs::path& output)
+      : path_(output.parent_path() / ("." + output.filename().string() + ".tiles")) {}
+  TileFolder(const TileFolder&) = delete;
+  TileFolder& operator=(const TileFolder&) = delete;
+  ~TileFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  core::Result<void> make() const {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);  // of a run that was killed
+    return core::make_folder(path_);
+  }
+  [[nodiscard]] const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+/// The filtered points of a tile that are its own, not those of its margin.
+void keep_own(Cloud& cloud, CloudColumns& columns, const Eigen::Vector3d& shift, const TileKey& key,
+              double tile_m) {
+  std::vector<std::size_t> own;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const Eigen::Vector3d position = cloud[i].getVector3fMap().cast<double>() + shift;
+    if (position.allFinite() && tile_of(position, tile_m) == key) own.push_back(i);
+  }
+
+  columns = pick_columns(columns, own);
+  for (std::size_t i = 0; i < own.size(); ++i) cloud.points[i] = cloud.points[own[i]];
+  cloud.points.resize(own.size());
+  cloud.width = static_cast<std::uint32_t>(own.size());
+  cloud.height = 1;
+}
+
+/// Reads up to and including the end of a header; the text.
+std::string header_text(ByteReader& reader) {
+  std::string text;
+  std::string line;
+  while (reader.line(line, 4096)) {
+    text += line + "\n";
+    if (line == "end_header") break;
+  }
+  return text;
+}
+
+/// One file of the points of all pieces, which have the same properties.
+core::Result<void> join(const std::vector<fs::path>& pieces, std::size_t points, const fs::path& output) {
+  core::OutputFile out(output);
+  std::string properties;
+  for (const fs::path& piece : pieces) {
+    ByteReader reader(piece);
+    const std::string header = header_text(reader);
+    const std::size_t count = header.find("element vertex ");
+    const std::size_t behind = header.find('\n', count);
+    if (properties.empty()) {
+      properties = header.substr(behind);
+      out.write(header.substr(0, count) + fmt::format("element vertex {}", points) + properties);
+    } else if (header.substr(behind) != properties) {
+      return core::usage_error("the chain gives tiles different properties; run it without --tiles");
+    }
+
+    constexpr std::uint64_t kBlock = 1 << 18;
+    while (reader.remaining() > 0) {
+      const auto size = static_cast<std::size_t>(std::min(kBlock, reader.remaining()));
+      const std::uint8_t* bytes = reader.take(size);
+      if (bytes == nullptr) return core::input_error(piece.string() + ": cannot be read back");
+      out.write(bytes, size);
+    }
+  }
+  return out.commit();
+}
+
+}  // namespace
+
+CloudFrame frame_of_ply(const fs::path& file) {
+  ByteReader reader(file);
+  const auto header = read_ply_header(reader);
+  return header ? frame_in(header->comments) : CloudFrame();
+}
+
+core::Result<TiledReport> filter_in_tiles(const FilterChain& chain, const std::vector<fs::path>& inputs,
+                                          const fs::path& output, double tile_m, CloudFrame& frame,
+                                          const core::Executor* executor,
+                                          const std::function<void(std::size_t, std::size_t)>& progress) {
+  const auto reach = chain.reach_m();
+  if (!reach) return tl::unexpected(reach.error());
+  constexpr double kRounding_m = 0.001;
+  const double margin_m = *reach + kRounding_m;
+  if (tile_m < 4.0 * margin_m) {
+    return core::usage_error(fmt::format(
+        "tiles of {:g} m are too small for chain {}, whose filters look {:g} m far; use {:g} m or more",
+        tile_m, chain.name(), *reach, 4.0 * margin_m));
+  }
+
+  // Every point into the files of its tiles.
+  const TileFolder folder(output);
+  if (auto made = folder.make(); !made) return tl::unexpected(made.error());
+  PlyTiles tiles(folder.path(), tile_m, margin_m);
+  for (const fs::path& input : inputs) {
+    if (core::ending_of(input) != ".ply")
+      return core::input_error(input.string() + ": tiles are cut from binary PLY files");
+    if (auto added = tiles.add(input); !added) return tl::unexpected(added.error());
+  }
+  if (auto finished = tiles.finish(); !finished) return tl::unexpected(finished.error());
+
+  // Tile by tile.
+  TiledReport report;
+  report.points_in = tiles.points();
+  const std::vector<TileKey> keys = tiles.keys();
+  report.tiles = keys.size();
+  std::vector<fs::path> pieces;
+  FilterContext context;
+  context.shift = tiles.shift();
+  context.executor = executor;
+
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    if (progress) progress(i, keys.size());
+    const fs::path file = tiles.file_of(keys[i]);
+    report.fullest = std::max(report.fullest, tiles.points_of(keys[i]));
+    auto tile = read_cloud(file, LargeCoordinates::kShifted);
+    if (!tile) return tl::unexpected(tile.error());
+    change_shift(*tile->cloud, tile->shift, context.shift);
+
+    CloudColumns columns = std::move(tile->columns);
+    CloudColumns made;
+    context.columns = &columns;
+    context.made_columns = &made;
+    context.frame = &frame;
+    auto filtered = chain.apply(std::move(tile->cloud), context);
+    if (!filtered) return tl::unexpected(filtered.error());
+    keep_own(**filtered, made, context.shift, keys[i], tile_m);
+
+    std::error_code ignored;
+    fs::remove(file, ignored);
+    if ((*filtered)->empty()) continue;
+    report.points_out += (*filtered)->size();
+    pieces.push_back(folder.path() / fmt::format("piece{}.ply", i));
+    if (auto written = write_ply(pieces.back(), **filtered, made, context.shift, frame.comments()); !written)
+      return tl::unexpected(written.error());
+  }
+
+  if (progress) progress(keys.size(), keys.size());
+  const auto written = pieces.empty() ? write_ply(output, Cloud(), {}, context.shift, frame.comments())
+                                      : join(pieces, report.points_out, output);
+  if (!written) return tl::unexpected(written.error());
+  return report;
+}
+
+}  // namespace plumbline::cloud
