@@ -10,7 +10,7 @@
 namespace plumbline::dataset {
 namespace {
 
-class FolderSource final : public FrameSource {
+class FolderSource final : public FrameSource, public BodySource {
  public:
   FolderSource(std::string name, Layout layout, sensor::Camera camera, const sensor::Pinhole& rectified)
       : name_(std::move(name)),
@@ -29,6 +29,14 @@ class FolderSource final : public FrameSource {
   [[nodiscard]] PairInfo info(std::size_t index) const override { return layout_.pairs.at(index); }
   [[nodiscard]] std::optional<geometry::Trajectory> truth() const override { return layout_.truth; }
   [[nodiscard]] bool truth_is_odometry() const override { return layout_.truth_is_odometry; }
+  [[nodiscard]] BodyReadings body_readings(double imu_after, double odometry_after,
+                                           double until) const override {
+    if (layout_.body == nullptr) return {};
+    BodyReadings readings =
+        readings_between(layout_.body->imu, layout_.body->odometry, imu_after, odometry_after, until);
+    readings.body_from_camera = layout_.body->body_from_camera;
+    return readings;
+  }
   [[nodiscard]] std::string doubt() const override { return doubt_; }
   void set_doubt(std::string doubt) { doubt_ = std::move(doubt); }
 

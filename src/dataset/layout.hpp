@@ -12,6 +12,7 @@
 
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/log.hpp"
+#include "plumbline/dataset/body_readings.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/sensor/camera_file.hpp"
 
@@ -46,6 +47,7 @@ struct Layout {
   bool truth_is_odometry = false;              ///< the recorder's own poses, known while recording
   bool gives_odometry = false;                 ///< frames have them
   std::shared_ptr<const ImageStore> images{};  ///< where the images are; null: in files
+  std::shared_ptr<const BodyReadings> body{};  ///< of wheels and inertial sensor; null: none
   std::filesystem::path folder{};              ///< the recording's, as it was given
   std::size_t missing = 0;                     ///< frames of the part that is read whose files do not exist
 };
@@ -54,6 +56,7 @@ struct LayoutOptions {
   double max_pair_gap_s = 0.02;
   double fps = 30.0;  ///< for layouts without stamps
   double depth_delay_s = 0.0;
+  bool body = false;  ///< read what wheels and an inertial sensor measured
 };
 
 /// Seconds nearest to whole nanoseconds, which is what stamps of messages are.

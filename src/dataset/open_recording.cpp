@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "bags/bag_recording.hpp"
+#include "body/body_tables.hpp"
 #include "depth_check.hpp"
 #include "films/video_frames.hpp"
 #include "frame_images.hpp"
@@ -229,6 +230,7 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
   const auto chosen = choose_camera(folder, options, log);
   LayoutOptions layout_options;
   layout_options.max_pair_gap_s = options.max_pair_gap_s;
+  layout_options.body = options.poses == PoseUse::kPrior;
 
   if (chosen && *chosen) {
     layout_options.fps = (*chosen)->reading.camera.fps;
@@ -243,6 +245,8 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
   }
   if (!layout) return tl::unexpected(layout.error());
   layout->folder = folder;
+  if (layout_options.body && layout->body == nullptr && is_folder(folder))
+    layout->body = read_body_tables(folder, !layout->truth_is_odometry, log);
   round_stamps(layout->pairs);
   drop_same_stamps(folder.string(), layout->pairs, log);
   const auto listed = leave_out_missing(folder.string(), *layout, log);

@@ -52,13 +52,15 @@ Tracker::PoseHypotheses Tracker::pose_hypotheses(const maps::Map& map, const sen
     result.searched = seen.has_value();
   }
 
+  const bool sensed = motion_.knows_turn() || motion_.knows_wheels();
+  if (sensed) result.camera_from_world.push_back(predicted);
   if (options_.thumbnails) {
     const ThumbnailAlignment alignment = align_thumbnails(thumbnail_, thumbnail_depth_, features.thumbnail,
                                                           camera_, predicted * last.inverse());
     if (alignment.better) result.camera_from_world.push_back(alignment.current_from_previous * last);
   }
 
-  result.camera_from_world.push_back(predicted);
+  if (!sensed) result.camera_from_world.push_back(predicted);
   result.camera_from_world.push_back(last);
   if (options_.photometric && features.photometric != nullptr)
     rank_by_intensity(map, {features.photometric.get(), &frame.depth, {}, camera_}, result);

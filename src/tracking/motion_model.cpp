@@ -7,7 +7,12 @@ namespace plumbline::tracking {
 
 geometry::Rigid3 MotionModel::predict(double stamp) const {
   if (knows_odometry()) return odometry_->inverse() * *last_odometry_ * camera_from_world_;
-  return motion_within(std::clamp(stamp - stamp_, 0.0, 0.2)) * camera_from_world_;
+  geometry::Rigid3 motion = motion_within(std::clamp(stamp - stamp_, 0.0, 0.2));
+  if (knows_wheels()) motion = *sensed_.moved;
+  // The camera's centre moves as before; how it turns the gyroscope knows better.
+  if (knows_turn())
+    motion = {*sensed_.turned, *sensed_.turned * (motion.rotation.transpose() * motion.translation)};
+  return motion * camera_from_world_;
 }
 
 std::optional<geometry::Vector6d> MotionModel::velocity_after(double stamp, const geometry::Rigid3& pose,
@@ -16,8 +21,8 @@ std::optional<geometry::Vector6d> MotionModel::velocity_after(double stamp, cons
   if (!continuous() || !(step_s > 1e-4 && step_s < 0.5)) return std::nullopt;
   // Velocities are means over their steps; that of the middle of `dt` lies half a step and dt / 2 further on.
   const geometry::Vector6d mean = geometry::log_se3(pose * camera_from_world_.inverse()) / step_s;
-  if (velocity_.isZero(0.0)) return mean;
-  return mean + (0.5 + 0.5 * dt / step_s) * (mean - velocity_);
+  if (velocity_.isZero(0.0)) return with_turn_rate(mean);
+  return with_turn_rate(mean + (0.5 + 0.5 * dt / step_s) * (mean - velocity_));
 }
 
 bool MotionModel::reliable(double stamp) const {

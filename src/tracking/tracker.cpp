@@ -58,8 +58,14 @@ void TrackerOptions::declare(core::OptionTable& table) {
 Tracker::Tracker(const TrackerOptions& options, const sensor::Pinhole& camera)
     : options_(options), camera_(camera) {}
 
-TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features) {
+/// Gives the motion model what is known of this frame besides its pictures.
+void Tracker::sense(const sensor::RgbdFrame& frame) {
   motion_.set_odometry(frame.odometry);
+  if (sensor_) motion_.set_sensed(sensor_(motion_.last_stamp(), frame.stamp));
+}
+
+TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features) {
+  sense(frame);
   if (map.keyframe_count() == 0) return initialise(frame, features);
 
   const TrackedImage image = image_of(frame, features);
@@ -70,15 +76,17 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
 }
 
 TrackResult Tracker::follow(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features) {
-  motion_.set_odometry(frame.odometry);
+  sense(frame);
   const TrackedImage image = image_of(frame, features);
   std::optional<TrackResult> result = track_with_motion_model(map, image);
   return result ? recorded(image, *std::move(result)) : lost(frame);
 }
 
 TrackedImage Tracker::image_of(const sensor::RgbdFrame& frame, const Features& features) const {
-  const ImageMotion motion{options_.readout_s * motion_.velocity(),
-                           motion_.motion_within(depth_delay_s(frame))};
+  const geometry::Vector6d velocity = motion_.velocity_now();
+  const ImageMotion motion{options_.readout_s * velocity,
+                           motion_.knows_turn() ? geometry::exp_se3(velocity * depth_delay_s(frame))
+                                                : motion_.motion_within(depth_delay_s(frame))};
   return {frame, features, motion, synchronised(features, frame.depth, camera_, motion)};
 }
 

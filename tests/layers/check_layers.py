@@ -19,7 +19,7 @@ LAYERS = [
     ["dataset", "features", "diagnose", "cloud", "optimize"],
     ["maps"],
     ["tracking", "places", "evaluate", "synth", "viewer", "check"],
-    ["mapping"],
+    ["mapping", "inertial"],
     ["viz", "exports", "localize"],
     ["pipeline", "report"],
     ["net"],

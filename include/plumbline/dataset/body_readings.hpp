@@ -3,13 +3,14 @@
 
 // Measurements of a body beside those of its camera.
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "plumbline/geometry/rigid3.hpp"
 
 namespace plumbline::dataset {
 
-/// In the frame of the body: x forward, y to the left, z up.
+/// In the frame of the body: x forward, y to the left, z up; of other programs in that of their sensor.
 struct ImuReading {
   double stamp = 0.0;
   Eigen::Vector3d turn_rate;     ///< rad/s
@@ -26,7 +27,21 @@ struct OdometryReading {
 struct BodyReadings {
   std::vector<ImuReading> imu;  ///< by stamp
   std::vector<OdometryReading> odometry;
-  geometry::Rigid3 body_from_camera;
+  std::optional<geometry::Rigid3> body_from_camera;  ///< of the odometry's body; none: not known
+};
+
+/// The readings with stamps in (imu_after, until], odometry's in (odometry_after, until].
+BodyReadings readings_between(const std::vector<ImuReading>& imu,
+                              const std::vector<OdometryReading>& odometry, double imu_after,
+                              double odometry_after, double until);
+
+/// A FrameSource that has such readings is this, too. Thread-safe.
+class BodySource {
+ public:
+  virtual ~BodySource() = default;
+  /// As readings_between; of a live source those that have come.
+  [[nodiscard]] virtual BodyReadings body_readings(double imu_after, double odometry_after,
+                                                   double until) const = 0;
 };
 
 }  // namespace plumbline::dataset

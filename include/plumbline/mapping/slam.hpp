@@ -96,6 +96,9 @@ class Slam {
     if (options_.loops.enabled) closer_.use(std::move(others));
   }
 
+  /// Sensors of the body that carries the camera (tracking::Tracker::set_motion_sensor).
+  void use(tracking::MotionSensor sensor) { tracker_.set_motion_sensor(std::move(sensor)); }
+
   using Features = std::shared_ptr<const features::FrameFeatures>;
   enum class Keyframe { kByRule, kYes, kNo };  ///< whether a frame becomes a keyframe
   /// Frames in order of time. The features are kept when the frame becomes a keyframe.

@@ -77,6 +77,9 @@ class RobotRecordings : public dataset::FrameSource {
   [[nodiscard]] std::optional<geometry::Trajectory> truth_of(std::int32_t robot) const {
     return recordings_[static_cast<std::size_t>(robot)]->truth();
   }
+  [[nodiscard]] const dataset::FrameSource& recording(std::int32_t robot) const {
+    return *recordings_[static_cast<std::size_t>(robot)];
+  }
   /// Truth of a single recording; none for several.
   [[nodiscard]] std::optional<geometry::Trajectory> truth() const override {
     return recordings_.size() == 1 ? recordings_.front()->truth() : std::nullopt;

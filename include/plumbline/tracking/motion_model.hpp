@@ -4,6 +4,7 @@
 // Constant velocity on SE(3), or the recorder's own odometry: where the camera is expected at a time, and how
 // far that can be trusted.
 #include <algorithm>
+#include <functional>
 #include <optional>
 
 #include "plumbline/geometry/rigid3.hpp"
@@ -12,11 +13,21 @@ namespace plumbline::tracking {
 
 struct TrackResult;
 
+/// Motion as sensors of the body tell it, between two moments; none: not known.
+struct SensedMotion {
+  std::optional<geometry::Rigid3> moved;     ///< camera later from camera earlier, by wheels
+  std::optional<Eigen::Matrix3d> turned;     ///< its rotation, by a gyroscope
+  std::optional<Eigen::Vector3d> turn_rate;  ///< rad/s at the later moment, in the camera's frame
+};
+using MotionSensor = std::function<SensedMotion(double earlier, double later)>;
+
 class MotionModel {
  public:
   /// Sets the recorder's odometry for the frame that is tracked next, world_from_camera in a world of its
   /// own; none: it has no pose.
   void set_odometry(const std::optional<geometry::Rigid3>& pose) { odometry_ = pose; }
+  /// Sets what sensors say of the motion from the last tracked frame to the one that is tracked next.
+  void set_sensed(SensedMotion sensed) { sensed_ = std::move(sensed); }
   /// camera_from_world at a time: by odometry, from the last tracked frame on, or else by velocity, at most
   /// 0.2 s after the last pose.
   [[nodiscard]] geometry::Rigid3 predict(double stamp) const;
@@ -48,17 +59,25 @@ class MotionModel {
   [[nodiscard]] bool reliable(double stamp) const;
   /// True after a while without a pose: surfaces near the last one fit by chance.
   [[nodiscard]] int lost_frames() const { return lost_frames_; }
-  [[nodiscard]] bool outdated() const { return lost_frames_ >= (knows_odometry() ? 60 : 5); }
+  [[nodiscard]] bool outdated() const {
+    return lost_frames_ >= (knows_odometry() || knows_wheels() ? 60 : 5);
+  }
   /// True after some more time without a pose: the last one is of no use.
-  [[nodiscard]] bool expired() const { return lost_frames_ >= (knows_odometry() ? 300 : 30); }
+  [[nodiscard]] bool expired() const {
+    return lost_frames_ >= (knows_odometry() || knows_wheels() ? 300 : 30);
+  }
   /// Radius of the search for features around their prediction, pixels.
   [[nodiscard]] double search_radius_px() const { return 12.0 + 4.0 * std::min(lost_frames_, 5); }
   /// True if the motion model may still constrain a direction that no measurement constrains.
   [[nodiscard]] bool may_dead_reckon() const {
-    return continuous() && dead_reckoning_s_ < (knows_odometry() ? 20.0 : 2.5);
+    return (continuous() || knows_wheels()) && dead_reckoning_s_ < (knows_wheels() ? 60.0 : knows_odometry() ? 20.0 : 2.5);
   }
   /// True if odometry gives the motion from the last tracked frame to the present one.
   [[nodiscard]] bool knows_odometry() const { return valid_ && odometry_ && last_odometry_; }
+  /// True if wheels give the motion from the last tracked frame to the present one, but for slip.
+  [[nodiscard]] bool knows_wheels() const { return valid_ && sensed_.moved; }
+  /// True if a gyroscope gives its rotation.
+  [[nodiscard]] bool knows_turn() const { return valid_ && sensed_.turned; }
   /// True if measurements have contradicted the model since little but surfaces was measured.
   [[nodiscard]] bool contradicted() const { return contradicted_; }
 
@@ -68,9 +87,16 @@ class MotionModel {
   [[nodiscard]] geometry::Vector6d velocity() const {
     return continuous() ? velocity_ : geometry::Vector6d(geometry::Vector6d::Zero());
   }
+  /// The same at the present frame, its turn by the gyroscope where there is one.
+  [[nodiscard]] geometry::Vector6d velocity_now() const { return with_turn_rate(velocity()); }
   [[nodiscard]] double turn_rate() const { return velocity_.tail<3>().norm(); }
 
  private:
+  [[nodiscard]] geometry::Vector6d with_turn_rate(geometry::Vector6d velocity) const {
+    if (sensed_.turn_rate) velocity.tail<3>() = -*sensed_.turn_rate;
+    return velocity;
+  }
+
   double stamp_ = 0.0;  ///< of the last tracked frame
   geometry::Rigid3 camera_from_world_;
   bool valid_ = false;
@@ -80,6 +106,7 @@ class MotionModel {
   int lost_frames_ = 0;
   double dead_reckoning_s_ = 0.0;  ///< time for which it has held unmeasured directions
   bool contradicted_ = false;
+  SensedMotion sensed_;                            ///< from the last tracked frame to the present one
   std::optional<geometry::Rigid3> odometry_;       ///< of the present frame
   std::optional<geometry::Rigid3> last_odometry_;  ///< of the last tracked frame
 };

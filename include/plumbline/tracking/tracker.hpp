@@ -110,6 +110,9 @@ class Tracker {
   /// unchanged. A readout of 0 is a global shutter's.
   void set_shutter(std::optional<double> readout_s);
 
+  /// Sets the sensors of the body that carries the camera, asked for each frame; empty: none.
+  void set_motion_sensor(MotionSensor sensor) { sensor_ = std::move(sensor); }
+
   /// Adapts the intensities that are kept of keyframes to a refined camera.
   void recalibrate(const sensor::Recalibration& change) { photometric_.recalibrate(change); }
 
@@ -169,6 +172,7 @@ class Tracker {
   [[nodiscard]] TrackResult initialise(const sensor::RgbdFrame& frame, const Features& features);
   [[nodiscard]] TrackResult lost(const sensor::RgbdFrame& frame);
   [[nodiscard]] TrackedImage image_of(const sensor::RgbdFrame& frame, const Features& features) const;
+  void sense(const sensor::RgbdFrame& frame);
   TrackResult recorded(const TrackedImage& image, TrackResult result);
   /// Tracks from the predicted pose; none if no pose found there can be trusted.
   [[nodiscard]] std::optional<TrackResult> track_with_motion_model(const maps::Map& map,
@@ -201,6 +205,7 @@ class Tracker {
   PlaceFinder find_places_;
   PlaceJudge is_place_;
   MotionModel motion_;
+  MotionSensor sensor_;
   cv::Mat thumbnail_;  ///< of the last tracked frame
   cv::Mat thumbnail_depth_;
 };

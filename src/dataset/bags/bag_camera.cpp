@@ -210,8 +210,9 @@ Transforms read_all_transforms(const BagSurvey& survey) {
   for (const char* name : {"/tf_static", "/tf"}) {  // ROS 1's publishers of fixed frames use /tf
     const SurveyedTopic* topic = survey.find(name);
     if (topic == nullptr || topic->decoder == nullptr) continue;
-    for (const MessagePlace& place : topic->others) {
-      if (const auto message = survey.read(*topic, place, &MessageDecoder::transforms))
+    const std::size_t count = std::min(topic->others.size(), kFewMessages);
+    for (std::size_t i = 0; i < count; ++i) {
+      if (const auto message = survey.read(*topic, topic->others[i], &MessageDecoder::transforms))
         transforms.add(*message);
     }
   }
@@ -330,6 +331,14 @@ core::Result<std::optional<sensor::CameraReading>> bag_camera(const BagSurvey& s
   }
 
   return reading;
+}
+
+std::optional<Rigid3> body_from_camera(const BagSurvey& survey, const ChosenTopics& topics,
+                                       const std::string& body) {
+  if (topics.info.topic == nullptr || body.empty()) return std::nullopt;
+  const auto info = survey.first(*topics.info.topic, &MessageDecoder::camera_info);
+  if (!info) return std::nullopt;
+  return read_all_transforms(survey).between(frame_name(body), frame_name(info->header.frame_id));
 }
 
 }  // namespace plumbline::dataset

@@ -18,4 +18,8 @@ namespace plumbline::dataset {
 core::Result<std::optional<sensor::CameraReading>> bag_camera(const BagSurvey& survey,
                                                               const ChosenTopics& topics, core::Log& log);
 
+/// How the camera sits in a frame of the robot, by the transforms of the bag; none: they do not say.
+std::optional<geometry::Rigid3> body_from_camera(const BagSurvey& survey, const ChosenTopics& topics,
+                                                 const std::string& body);
+
 }  // namespace plumbline::dataset

@@ -11,6 +11,7 @@
 #include "bags/bag_camera.hpp"
 #include "bags/message_images.hpp"
 #include "bags/topics.hpp"
+#include "body/body_messages.hpp"
 #include "plumbline/core/numbers.hpp"
 
 namespace plumbline::dataset {
@@ -158,6 +159,7 @@ core::Result<Layout> read_bag(const std::filesystem::path& path, const TopicName
   }
 
   if (layout.camera && survey->camera_yaml.empty()) layout.camera->camera.fps = usual_fps(layout.pairs);
+  if (options.body) layout.body = read_bag_body(*survey, *topics, log);
   layout.images = std::make_shared<BagImages>(survey->files, std::move(color), std::move(depth));
   return layout;
 }

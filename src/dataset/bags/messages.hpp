@@ -61,12 +61,19 @@ struct CameraInfoMessage {
   RegionMessage roi;
 };
 
-/// geometry_msgs/TransformStamped of a tf2_msgs/TFMessage
+/// geometry_msgs/TransformStamped of a tf2_msgs/TFMessage; frames, pose and stamp of a nav_msgs/Odometry
 struct TransformMessage {
   std::string parent;
   std::string child;
   geometry::Rigid3 parent_from_child;
-  std::int64_t stamp_ns = 0;  ///< set by CDR's decoder
+  std::int64_t stamp_ns = 0;
+};
+
+/// sensor_msgs/Imu
+struct ImuMessage {
+  MessageHeader header;
+  Eigen::Vector3d turn_rate;     ///< rad/s
+  Eigen::Vector3d acceleration;  ///< m/s^2
 };
 
 /// nav_msgs/Path: all poses in the header's frame
@@ -96,6 +103,8 @@ struct MessageDecoder {
   DecodedMessage<std::vector<TransformMessage>> (*transforms)(const Bytes& bytes);
   DecodedMessage<geometry::Rigid3> (*transform)(const Bytes& bytes);  ///< geometry_msgs/Transform
   DecodedMessage<float> (*number)(const Bytes& bytes);                ///< std_msgs/Float32
+  DecodedMessage<ImuMessage> (*imu)(const Bytes& bytes);
+  DecodedMessage<TransformMessage> (*odometry)(const Bytes& bytes);  ///< nav_msgs/Odometry
 };
 
 /// Encodes messages as CDR, little endian, with the four bytes of encapsulation in front.

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "bags/bag_parts.hpp"
+#include "body/body_messages.hpp"
 #include "layout.hpp"
 #include "plumbline/core/git_lfs.hpp"
 #include "plumbline/core/text.hpp"
@@ -130,7 +131,6 @@ class Surveyor {
   }
 
   void visit(const BagFile& bag, std::uint32_t file, const BagEntry& entry) {
-    constexpr std::size_t kMostOthers = 512;
     SurveyedTopic& topic = topic_of(bag, entry.topic);
     topic.first_ns = topic.count == 0 ? entry.log_ns : std::min(topic.first_ns, entry.log_ns);
     topic.last_ns = topic.count == 0 ? entry.log_ns : std::max(topic.last_ns, entry.log_ns);
@@ -138,7 +138,7 @@ class Surveyor {
     MessagePlace place = entry.place;
     place.file = file;
     if (!topic.has_images()) {
-      if (topic.others.size() < kMostOthers) topic.others.push_back(place);
+      if (topic.others.size() < kFewMessages || tells_of_body(topic.topic)) topic.others.push_back(place);
     } else if (topic.decoder != nullptr) {
       const auto stamp = topic.decoder->stamp(entry.head, entry.head_size);
       if (stamp) {

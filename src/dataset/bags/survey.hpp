@@ -19,6 +19,8 @@ struct ImageEntry {
   MessagePlace place;
 };
 
+constexpr std::size_t kFewMessages = 512;
+
 struct SurveyedTopic {
   BagTopic topic;
   const MessageDecoder* decoder = nullptr;  ///< null: messages in an encoding that is not read
@@ -26,7 +28,7 @@ struct SurveyedTopic {
   std::int64_t first_ns = 0;  ///< when messages were logged
   std::int64_t last_ns = 0;
   std::vector<ImageEntry> images;    ///< all messages of an image topic, in the order of the bag
-  std::vector<MessagePlace> others;  ///< the first few of the small messages about cameras
+  std::vector<MessagePlace> others;  ///< the first few of other messages; all of those that tell of the body
 
   [[nodiscard]] bool is(const char* type) const { return topic.type == type; }
   [[nodiscard]] bool has_images() const {

@@ -172,7 +172,8 @@ class McapTarget final : public CopyTarget {
     begun_ = true;
     std::vector<TransformMessage> fixed;
     if (own_depth_camera_) fixed.push_back({kColorFrame, kDepthFrame, *camera_.color_from_depth});
-    if (body_ != nullptr) fixed.push_back({kBodyFrame, kColorFrame, body_->body_from_camera});
+    if (body_ != nullptr && body_->body_from_camera)
+      fixed.push_back({kBodyFrame, kColorFrame, *body_->body_from_camera});
     if (!fixed.empty()) bag_->write("/tf_static", fixed, stamp_ns);
   }
 

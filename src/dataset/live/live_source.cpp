@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cctype>
+#include <map>
 #include <utility>
 
 #include "bags/bag_camera.hpp"
@@ -23,9 +24,10 @@ struct LiveCamera {
   std::string doubt;
   Layout layout;  ///< layout of the first frames; its images come from the stream
   std::shared_ptr<LiveStream> stream;
+  std::map<std::string, geometry::Rigid3> body_from_camera;  ///< by the body's frame
 };
 
-class LiveSource final : public FrameSource {
+class LiveSource final : public FrameSource, public BodySource {
  public:
   LiveSource(std::shared_ptr<LiveCamera> live, sensor::Camera camera, const sensor::Pinhole& rectified,
              std::vector<double> delays)
@@ -72,6 +74,14 @@ class LiveSource final : public FrameSource {
   [[nodiscard]] bool decided(std::size_t index) const override { return live_->stream->decided(index); }
   void keep(std::size_t index) const override { live_->stream->keep(index); }
   [[nodiscard]] core::Result<void> finish() const override { return live_->stream->finish(); }
+
+  [[nodiscard]] BodyReadings body_readings(double imu_after, double odometry_after,
+                                           double until) const override {
+    BodyReadings readings = live_->stream->body_readings(imu_after, odometry_after, until);
+    const auto known = live_->body_from_camera.find(live_->stream->body_frame());
+    if (known != live_->body_from_camera.end()) readings.body_from_camera = known->second;
+    return readings;
+  }
 
   [[nodiscard]] LiveReport report() const override {
     const LiveCounts counts = live_->stream->counts();
@@ -137,13 +147,15 @@ core::Result<sensor::Camera> complete_live_camera(const std::string& address, co
 }
 
 std::shared_ptr<LiveStream> make_stream(const std::string& address, std::unique_ptr<MessageStream> stream,
-                                        const ChosenTopics& topics, const std::optional<ChosenCamera>& chosen,
-                                        const OpenOptions& options, core::Log& log) {
+                                        const ChosenTopics& topics, const std::vector<BagTopic>& body,
+                                        const std::optional<ChosenCamera>& chosen, const OpenOptions& options,
+                                        core::Log& log) {
   LiveStream::Options how;
   how.address = address;
   how.max_pair_gap_s = options.max_pair_gap_s;
   if (chosen) how.depth_delay_s = chosen->reading.camera.depth_delay_s;
   how.for_s = options.live.for_s;
+  how.body = body;
   how.stop = options.live.stop;
   how.most_waiting_bytes = options.live.most_waiting_bytes;
   const auto topic = [](const ChosenTopic& of) { return LiveTopic{of.topic->topic, of.topic->decoder}; };
@@ -197,7 +209,8 @@ core::Result<std::unique_ptr<FrameSource>> open_live(const std::string& address,
   if (!chosen) return tl::unexpected(chosen.error());
 
   // Listen until it is clear what the camera is.
-  const auto found = survey_stream(address, *stream, options.topics, how.patience, how.stop);
+  const auto found = survey_stream(address, *stream, options.topics, how.patience, how.stop,
+                                   options.poses == PoseUse::kPrior);
   if (!found) return tl::unexpected(found.error());
   const auto topics = choose_topics(found->survey, options.topics);
   if (!topics) return tl::unexpected(topics.error());
@@ -206,7 +219,11 @@ core::Result<std::unique_ptr<FrameSource>> open_live(const std::string& address,
 
   auto live = std::make_shared<LiveCamera>();
   live->name = how.record.empty() ? name_of_address(address) : how.record.stem().string();
-  live->stream = make_stream(address, std::move(stream), *topics, *chosen, options, log);
+  live->stream = make_stream(address, std::move(stream), *topics, found->body, *chosen, options, log);
+  for (const char* frame : {"base_link", "base_footprint"}) {
+    if (const auto known = body_from_camera(found->survey, *topics, frame))
+      live->body_from_camera[frame] = *known;
+  }
   if (auto begun = begin(address, *found, *topics, options, *live); !begun)
     return tl::unexpected(begun.error());
 

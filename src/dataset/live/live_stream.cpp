@@ -43,13 +43,21 @@ void LiveStream::add(const LiveMessage& message) { take(message); }
 
 void LiveStream::take(const LiveMessage& message) {
   const bool color = message.topic == color_.topic.name;
-  if (!color && message.topic != depth_.topic.name) return;
+  if (!color && message.topic != depth_.topic.name) {
+    const auto told = std::find_if(options_.body.begin(), options_.body.end(),
+                                   [&](const BagTopic& topic) { return topic.name == message.topic; });
+    const std::lock_guard lock(mutex_);
+    if (told != options_.body.end()) body_.add(*told, *color_.decoder, *message.bytes);
+    return;
+  }
+
   const MessageDecoder& decoder = color ? *color_.decoder : *depth_.decoder;
   const auto stamp = decoder.stamp(message.bytes->data(), std::min(message.bytes->size(), kHeadBytes));
   if (!stamp) return;
   // Drivers without a clock leave the stamp out.
   const std::int64_t stamp_ns = *stamp != 0 ? *stamp : message.received_ns;
   StampPairs::Stamped image{stamp_ns, message.received_ns, message.bytes};
+
   if (color) {
     pairs_.add_color(std::move(image));
   } else {
@@ -248,6 +256,16 @@ core::Result<LiveStream::Place> LiveStream::place_of(const std::string& name) co
 LiveCounts LiveStream::counts() const {
   const std::lock_guard lock(mutex_);
   return counts_;
+}
+
+BodyReadings LiveStream::body_readings(double imu_after, double odometry_after, double until) const {
+  const std::lock_guard lock(mutex_);
+  return readings_between(body_.imu(), body_.odometry(), imu_after, odometry_after, until);
+}
+
+std::string LiveStream::body_frame() const {
+  const std::lock_guard lock(mutex_);
+  return body_.body_frame();
 }
 
 core::Result<void> LiveStream::finish() {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "bags/message_images.hpp"
+#include "body/body_messages.hpp"
 #include "live/kept_messages.hpp"
 #include "live/live_record.hpp"
 #include "live/live_survey.hpp"
@@ -49,6 +50,7 @@ class LiveStream final : public MessageImages {
     double for_s = 1e300;
     core::StopToken stop;
     std::size_t most_waiting_bytes = 0;
+    std::vector<BagTopic> body;  ///< topics of wheels and inertial sensors
   };
 
   LiveStream(std::unique_ptr<MessageStream> stream, LiveTopic color, LiveTopic depth, Options options,
@@ -74,6 +76,9 @@ class LiveStream final : public MessageImages {
   void wait_for(std::size_t index, std::chrono::milliseconds most);
   void keep(std::size_t index);
   [[nodiscard]] LiveCounts counts() const;
+  /// As FrameSource's; the frame that odometry is about is "" as long as there is none.
+  [[nodiscard]] BodyReadings body_readings(double imu_after, double odometry_after, double until) const;
+  [[nodiscard]] std::string body_frame() const;
   /// Ends the source and closes the record. Error (kOutput): it could not be written.
   core::Result<void> finish();
 
@@ -122,6 +127,7 @@ class LiveStream final : public MessageImages {
   std::size_t forgotten_ = 0;  ///< frames before it are there only if they were kept
   std::size_t waiting_bytes_ = 0;
   LiveCounts counts_;
+  BodyMessages body_;
   bool ended_ = false;
   std::unique_ptr<core::SideThread> thread_;
 };

@@ -10,6 +10,7 @@
 
 #include "bags/bag_camera.hpp"
 #include "bags/bag_parts.hpp"
+#include "body/body_messages.hpp"
 
 namespace plumbline::dataset {
 namespace {
@@ -96,18 +97,24 @@ class StreamSurveyor {
     sort_topics();
     return std::move(found_);
   }
-  /// Keeps messages of these topics only.
-  void keep_only(const std::set<std::string>& topics) {
+  /// Keeps messages of these topics only, and of those that tell of the body, which it returns.
+  std::vector<BagTopic> keep_only(const std::set<std::string>& topics, bool with_body) {
+    std::vector<BagTopic> body;
     for (const auto& [topic, type] : types_) {
-      if (topics.count(topic) == 0) stream_.unsubscribe(topic);
+      const BagTopic told{topic, type, "cdr"};
+      if (with_body && tells_of_body(told))
+        body.push_back(told);
+      else if (topics.count(topic) == 0)
+        stream_.unsubscribe(topic);
     }
+    return body;
   }
 
  private:
   [[nodiscard]] bool wanted(const StreamTopic& topic) const {
     if (!topic.supported) return false;
     if (topic.type == "tf2_msgs/TFMessage") return topic.name == "/tf_static" || topic.name == "/tf";
-    if (topic.type == "sensor_msgs/CameraInfo") return true;
+    if (topic.type == "sensor_msgs/CameraInfo" || tells_of_body({topic.name, topic.type, ""})) return true;
     const bool all = named_.color.empty() || named_.depth.empty();
     return is_image_type(topic.type) && (all || topic.name == named_.color || topic.name == named_.depth);
   }
@@ -138,13 +145,12 @@ class StreamSurveyor {
 
   void add(const LiveMessage& message) {
     constexpr std::size_t kMostImages = 5;  // so many are tried for the encoding
-    constexpr std::size_t kMostOthers = 512;
     SurveyedTopic& topic = topic_of(message.topic);
     topic.first_ns = topic.count == 0 ? message.received_ns : topic.first_ns;
     topic.last_ns = message.received_ns;
     ++topic.count;
     if (!topic.has_images()) {
-      if (topic.others.size() < kMostOthers) topic.others.push_back(bag_->add(message.bytes));
+      if (topic.others.size() < kFewMessages) topic.others.push_back(bag_->add(message.bytes));
       return;
     }
     const auto stamp =
@@ -196,7 +202,7 @@ std::string published_text(const std::vector<StreamTopic>& topics) {
 
 core::Result<LiveSurvey> survey_stream(const std::string& address, MessageStream& stream,
                                        const TopicNames& named, std::chrono::milliseconds patience,
-                                       const core::StopToken& stop) {
+                                       const core::StopToken& stop, bool with_body) {
   const auto& readers = core::part<BagReaders>();
   if (!readers) return tl::unexpected(readers.error());
   StreamSurveyor surveyor(address, stream, named, **readers);
@@ -211,7 +217,8 @@ core::Result<LiveSurvey> survey_stream(const std::string& address, MessageStream
   LiveSurvey found = surveyor.take();
   const auto chosen = choose_topics(found.survey, named);
   if (!chosen) return tl::unexpected(chosen.error());
-  surveyor.keep_only({chosen->color.topic->topic.name, chosen->depth.topic->topic.name});
+  found.body =
+      surveyor.keep_only({chosen->color.topic->topic.name, chosen->depth.topic->topic.name}, with_body);
   return found;
 }
 

@@ -22,15 +22,17 @@ struct LiveMessage {
 
 struct LiveSurvey {
   BagSurvey survey;
+  std::vector<BagTopic> body;       ///< topics of wheels and inertial sensors that stay subscribed
   std::vector<LiveMessage> images;  ///< all received so far, in order, so that none is lost during the survey
 };
 
 /// Subscribes to all topics that could be a camera's until colour, depth and their calibration have arrived,
-/// for at most `patience`; then unsubscribes from all but the chosen images. `named` as in choose_topics.
-/// Errors: those of choose_topics; kInput: no image arrived (names the topics and types that were seen).
+/// for at most `patience`; then unsubscribes from all but the chosen images and, if `with_body`, what tells
+/// of the body. `named` as in choose_topics. Errors: those of choose_topics; kInput: no image arrived (names
+/// the topics and types that were seen).
 core::Result<LiveSurvey> survey_stream(const std::string& address, MessageStream& stream,
                                        const TopicNames& named, std::chrono::milliseconds patience,
-                                       const core::StopToken& stop);
+                                       const core::StopToken& stop, bool with_body = false);
 
 /// The published topics, one line each.
 std::string published_text(const std::vector<StreamTopic>& topics);

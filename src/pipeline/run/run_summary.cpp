@@ -68,6 +68,27 @@ double tracked_percent(const Json& frames) {
   return all > 0.0 ? 100.0 * frames.at("tracked").get<double>() / all : 0.0;
 }
 
+/// One line for each robot with sensors beside its camera.
+std::string sensors_text(const Json& summary) {
+  std::string text;
+  for (const Json& robot : summary.at("sensors")) {
+    text += "sensors    ";
+    if (summary.at("sensors").size() > 1) text += robot.at("robot").get<std::string>() + ": ";
+    if (robot.contains("gyro")) text += "gyroscope " + robot.at("gyro").at("use").get<std::string>();
+    if (robot.contains("gyro") && robot.contains("odometry")) text += ", ";
+    if (robot.contains("odometry")) {
+      const Json& wheels = robot.at("odometry");
+      text += "wheels " + wheels.at("use").get<std::string>();
+      if (wheels.contains("scale"))
+        text += fmt::format(", scale {:.4f} +- {:.4f}", wheels.at("scale").get<double>(),
+                            wheels.at("scale_sigma").get<double>());
+    }
+    text += "\n";
+  }
+  const auto bridged = summary.at("frames").at("bridged").get<std::size_t>();
+  return bridged > 0 ? text + fmt::format("bridged    {} frames by the gyroscope\n", bridged) : text;
+}
+
 /// Counts of frames that arrived and were mapped, and of the others.
 std::string live_text(const Json& live) {
   const auto count = [&](const char* name) { return live.at(name).get<std::size_t>(); };
@@ -122,6 +143,7 @@ std::string text_of(const Json& summary) {
                         count(frames.at("odometry")));
   }
 
+  if (summary.contains("sensors")) text += sensors_text(summary);
   if (summary.contains("live")) text += fmt::format("live       {}\n", live_text(summary.at("live")));
 
   if (summary.contains("localized")) {

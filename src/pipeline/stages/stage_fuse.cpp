@@ -19,6 +19,7 @@
 #include "plumbline/maps/stored_maps.hpp"
 #include "results/up_frame.hpp"
 #include "results/waiting_clouds.hpp"
+#include "robots/robot_bodies.hpp"
 #include "stages/stages.hpp"
 #include "summary/sections.hpp"
 
@@ -90,6 +91,7 @@ class FuseStage : public Stage {
     summary["frame"] = {{"up", report_.frame.up},
                         {"yaw", report_.frame.yaw},
                         {"output_from_map", rows(report_.frame.output_from_map)}};
+    if (report_.frame.up == "floor") report_up(report_.frame.output_from_map, summary);
   }
   void doubt(const Json& summary, std::vector<Doubt>& reasons) const override {
     doubt_empty_cloud(summary, reasons);

@@ -17,6 +17,7 @@
 #include "results/frame_rows.hpp"
 #include "results/resumed_run.hpp"
 #include "robots/observed_way.hpp"
+#include "robots/robot_bodies.hpp"
 #include "robots/robot_cameras.hpp"
 #include "robots/robot_components.hpp"
 #include "robots/still_camera.hpp"
@@ -42,6 +43,9 @@ class TrackStage : public Stage {
  public:
   void declare(core::OptionTable& table) override {
     options_.declare(table);
+    table.boolean("gyro", gyro_, "Use the gyroscope of a recording that has one, once its axes are known");
+    table.boolean("wheels", wheels_,
+                  "Use wheel odometry of a recording that has it, once its scale is known");
     table.choice<bool>("camera.refine", refine_, {{"auto", true}, {"off", false}},
                        "Estimate the camera from the map, after 40 keyframes or 10 s and at the end, and "
                        "rebuild the map for it");
@@ -54,11 +58,13 @@ class TrackStage : public Stage {
 
   core::Result<void> start(const RunContext& context) override {
     context_ = &context;
+    bodies_.emplace(recordings(), gyro_, wheels_, *context.log);
     const auto begin = [this](const RobotInfo& robot) {
       auto slam = std::make_unique<mapping::Slam>(options_, robot.camera.color, robot.number,
                                                   *context_->executor, *context_->log);
       slam->set_camera(robot.camera);
       if (context_->hooks.feedback != nullptr) slam->use(context_->hooks.feedback);
+      slam->use(bodies_->sensor(robot.number));
       return slam;
     };
     for (const RobotInfo& robot : recordings().robots()) slams_.push_back(begin(robot));
@@ -84,7 +90,9 @@ class TrackStage : public Stage {
     const std::size_t poses = slam.frame_poses().size();
     const int taken_back = slam.taken_back();
 
+    bodies_->before(robot.number, frame->stamp);
     const mapping::FrameReport report = slam.process(*frame, features);
+    bodies_->after(robot.number, slam.frame_poses());
     if (slam.taken_back() > taken_back) unstored_[number].since = {};  // edges that are stored have changed
     note(io.frame(), robot, report, shows_nothing(*frame, features->points.size()));
 
@@ -123,13 +131,14 @@ class TrackStage : public Stage {
     std::sort(rows_.begin(), rows_.end(),
               [](const FrameRow& a, const FrameRow& b) { return a.frame < b.frame; });
     result->frame_columns = (several() ? "robot," : "") + row_column_names();
-    result->frames = rows_;
     const bool merged = context_->resumed != nullptr && context_->resumed->merged;
 
     if (!merged) {
       for (const auto& slam : slams_) slam->finish();
       if (!context_->stop.stop_requested()) cameras_->estimate_finished(slams_);
+      bodies_->bridge(slams_, rows_);
     }
+    result->frames = rows_;
     auto written = write_cameras(context_->output_folder, cameras_->robots(), cameras_->now());
     if (!written) return written;
 
@@ -149,6 +158,7 @@ class TrackStage : public Stage {
     frames["period_s"] = rounded(period_s());
     frames["tracked"] = frames["tracked"].get<std::size_t>() - dropped_frames_;
     add(frames["lost"], dropped_frames_);
+    bodies_->report(summary);
 
     Json& components = summary["components"];
     components["dropped"] = dropped_;
@@ -273,6 +283,8 @@ class TrackStage : public Stage {
     for (const auto& [robot, map] : run.maps) {
       const auto number = static_cast<std::size_t>(robot);
       slams_.at(number)->restore(map.map, map.frames);
+      if (!map.frames.empty()) bodies_->before(robot, map.frames.back().stamp);
+      bodies_->after(robot, map.frames);
       unstored_[number].since = slams_[number]->map().now();
     }
   }
@@ -287,7 +299,10 @@ class TrackStage : public Stage {
   const RunContext* context_ = nullptr;
   mapping::SlamOptions options_;
   bool refine_ = true;
+  bool gyro_ = true;
+  bool wheels_ = true;
   int pictures_ = 1000;
+  std::optional<RobotBodies> bodies_;  ///< before the trackers that ask it
   Slams slams_;
   std::optional<RobotCameras> cameras_;
   std::vector<ObservedWay> observed_;     ///< by robot

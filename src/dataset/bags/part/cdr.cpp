@@ -85,6 +85,9 @@ using TransformSample = CdrSample<geometry_msgs_msg_dds__Transform_, geometry_ms
 using TimeSample = CdrSample<builtin_interfaces_msg_dds__Time_, builtin_interfaces_msg_dds__Time__desc>;
 using NumberSample = CdrSample<std_msgs_msg_dds__Float32_, std_msgs_msg_dds__Float32__desc>;
 
+using ImuSample = CdrSample<sensor_msgs_msg_dds__Imu_, sensor_msgs_msg_dds__Imu__desc>;
+using OdometrySample = CdrSample<nav_msgs_msg_dds__Odometry_, nav_msgs_msg_dds__Odometry__desc>;
+
 std::string text_of(const char* text) { return text == nullptr ? "" : text; }
 
 Bytes bytes_of(const std::uint8_t* from, std::uint32_t length) {
@@ -187,6 +190,32 @@ DecodedMessage<float> read_number(const Bytes& bytes) {
   return sample->data;
 }
 
+DecodedMessage<ImuMessage> read_imu_message(const Bytes& bytes) {
+  ImuSample sample;
+  if (std::string wrong = sample.read(bytes.data(), bytes.size()); !wrong.empty())
+    return tl::unexpected(std::move(wrong));
+  const auto vector = [](const geometry_msgs_msg_dds__Vector3_& v) { return Eigen::Vector3d(v.x, v.y, v.z); };
+  ImuMessage message{header_of(sample->header), vector(sample->angular_velocity),
+                     vector(sample->linear_acceleration)};
+  if (!message.turn_rate.allFinite())
+    return tl::unexpected<std::string>("has a turn rate that is not finite");
+  return message;
+}
+
+DecodedMessage<TransformMessage> read_odometry(const Bytes& bytes) {
+  OdometrySample sample;
+  if (std::string wrong = sample.read(bytes.data(), bytes.size()); !wrong.empty())
+    return tl::unexpected(std::move(wrong));
+  const auto& p = sample->pose.pose.position;
+  const auto& q = sample->pose.pose.orientation;
+  TransformMessage message{text_of(sample->header.frame_id),
+                           text_of(sample->child_frame_id),
+                           {Eigen::Quaterniond(q.w, q.x, q.y, q.z), Eigen::Vector3d(p.x, p.y, p.z)},
+                           nanoseconds_of(sample->header.stamp)};
+  if (!is_motion(message.parent_from_child)) return tl::unexpected<std::string>("is not a motion");
+  return message;
+}
+
 // Samples to be written borrow their texts; the stream functions only read them.
 char* borrowed(const std::string& text) { return const_cast<char*>(text.c_str()); }
 
@@ -228,7 +257,7 @@ Bytes write_sample(const void* sample, const dds_topic_descriptor_t& descriptor)
 const MessageDecoder& cdr_decoder() {
   static const MessageDecoder decoder{&read_stamp,       &read_image_message, &read_compressed_message,
                                       &read_camera_info, &read_transforms,    &read_transform,
-                                      &read_number};
+                                      &read_number,      &read_imu_message,   &read_odometry};
   return decoder;
 }
 

@@ -141,7 +141,9 @@ DecodedMessage<std::vector<TransformMessage>> ros1_transforms(const Bytes& bytes
   std::vector<TransformMessage> transforms;
   for (auto count = fields.number<std::uint32_t>(); count > 0 && fields.good(); --count) {
     TransformMessage transform;
-    transform.parent = fields.header().frame_id;
+    MessageHeader header = fields.header();
+    transform.parent = std::move(header.frame_id);
+    transform.stamp_ns = header.stamp_ns;
     transform.child = fields.text();
     transform.parent_from_child = fields.transform();
     if (fields.good() && is_finite(transform.parent_from_child)) transforms.push_back(std::move(transform));
@@ -162,12 +164,37 @@ DecodedMessage<float> ros1_number(const Bytes& bytes) {
   return whole(fields, value);
 }
 
+DecodedMessage<ImuMessage> ros1_imu(const Bytes& bytes) {
+  Ros1Fields fields(bytes);
+  ImuMessage message;
+  message.header = fields.header();
+  std::array<double, 37> v{};  // orientation, turn rate, acceleration, each with its covariance
+  fields.numbers(v);
+  message.turn_rate = {v[13], v[14], v[15]};
+  message.acceleration = {v[25], v[26], v[27]};
+  if (!message.turn_rate.allFinite())
+    return tl::unexpected<std::string>("has a turn rate that is not finite");
+  return whole(fields, std::move(message));
+}
+
+DecodedMessage<TransformMessage> ros1_odometry(const Bytes& bytes) {
+  Ros1Fields fields(bytes);
+  TransformMessage message;
+  MessageHeader header = fields.header();
+  message.parent = std::move(header.frame_id);
+  message.stamp_ns = header.stamp_ns;
+  message.child = fields.text();
+  message.parent_from_child = fields.transform();
+  if (!is_finite(message.parent_from_child)) return tl::unexpected<std::string>("is not a motion");
+  return whole(fields, std::move(message));
+}
+
 }  // namespace
 
 const MessageDecoder& ros1_decoder() {
   static const MessageDecoder decoder{&ros1_stamp,       &ros1_image,      &ros1_compressed_image,
                                       &ros1_camera_info, &ros1_transforms, &ros1_transform,
-                                      &ros1_number};
+                                      &ros1_number,      &ros1_imu,        &ros1_odometry};
   return decoder;
 }
 

@@ -11,7 +11,7 @@
 namespace plumbline::net {
 namespace {
 
-const std::array<KnownType, 6> kTypes = {{
+const std::array<KnownType, 8> kTypes = {{
     {"sensor_msgs/Image", &sensor_msgs_msg_dds__Image__desc,
      "d31d41a9a4c4bc8eae9be757b0beed306564f7526c88ea6a4588fb9582527d47"},
     {"sensor_msgs/CompressedImage", &sensor_msgs_msg_dds__CompressedImage__desc, ""},
@@ -19,6 +19,8 @@ const std::array<KnownType, 6> kTypes = {{
     {"sensor_msgs/PointCloud2", &sensor_msgs_msg_dds__PointCloud2__desc,
      "9198cabf7da3796ae6fe19c4cb3bdd3525492988c70522628af5daa124bae2b5"},
     {"tf2_msgs/TFMessage", &tf2_msgs_msg_dds__TFMessage__desc, ""},
+    {"sensor_msgs/Imu", &sensor_msgs_msg_dds__Imu__desc, ""},
+    {"nav_msgs/Odometry", &nav_msgs_msg_dds__Odometry__desc, ""},
     {"nav_msgs/Path", &nav_msgs_msg_dds__Path__desc, ""},
 }};
 
