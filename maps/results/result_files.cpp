@@ -17,6 +17,7 @@ core::FileNames result_files() {
                         "trajectory.txt",
                         "keyframes.txt",
                         "keyframes.csv",
+                        "pose_samples.npy",
                         "frames.csv",
                         "timing.csv",
                         "summary.json",

@@ -54,6 +54,8 @@ std::string to_text(const CheckReport& report) {
     text += fmt::format("{:<22} {}\n", name, value);
   };
   line("expected error", fmt::format("{}, 95 %: {}", mm(report.expected_m), mm(report.p95_m)));
+  if (report.drift_m > 0.0)
+    line("drift", mm(report.drift_m) + " over the whole path: nothing was seen twice");
   line("told by the estimate", report.told_m > 0.0 ? mm(report.told_m) : "nothing");
 
   line("graph of corrections", fmt::format("{} RMS over {} frames", mm(report.graph_m), report.anchors));
@@ -102,6 +104,7 @@ std::string to_json(const CheckReport& report) {
                     {"reasons", report.reasons},
                     {"unchecked", report.unchecked},
                     {"told_m", rounded_m(report.told_m)},
+                    {"drift_m", rounded_m(report.drift_m)},
                     {"graph_m", rounded_m(report.graph_m)},
                     {"align", align},
                     {"revisits", report.align[kRevisit].pairs},

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plumbline/core/random.hpp"
 #include "plumbline/geometry/alignment.hpp"
+#include "samples.hpp"
 
 namespace plumbline::check {
 namespace {
@@ -21,6 +23,8 @@ constexpr double kBestTurn_rad = 0.002;
 /// The path itself ties anchors in a row.
 constexpr double kTie_per_root_s = 0.002;
 constexpr int kRounds = 4;
+constexpr double kApart_s = 30.0;  ///< draws tie one path to the next as if it went on after so long
+constexpr std::uint64_t kSeedOfDraws = 62;
 
 Matrix6d diagonal(double shift, double turn) {
   Vector6d values;
@@ -55,23 +59,40 @@ class Equations {
   }
 
   [[nodiscard]] Eigen::VectorXd solve(const std::vector<double>& weights) {
-    const auto size = static_cast<Eigen::Index>(6 * anchors_.size());
-    entries_.clear();
-    right_ = Eigen::VectorXd::Zero(size);
-    for (Eigen::Index i = 0; i < size; ++i) entries_.emplace_back(i, i, i < 6 ? 1e9 : 1e-6);
+    return Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>(matrix(weights, false)).solve(right_);
+  }
 
-    for (std::size_t a = 0; a + 1 < anchors_.size(); ++a) {
-      if (anchors_[a].way != anchors_[a + 1].way) continue;
-      const double seconds = std::max(0.03, anchors_[a + 1].stamp - anchors_[a].stamp);
-      const double tie = 1.0 / (kTie_per_root_s * kTie_per_root_s * seconds);
-      add(a, a + 1, Vector6d::Zero(), diagonal(tie, tie));
+  /// Columns are draws from the normal distribution whose information the equations are.
+  [[nodiscard]] Eigen::MatrixXd draw(const std::vector<double>& weights) {
+    const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(matrix(weights, true));
+    const Eigen::ArrayXd deviation = solver.vectorD().array().max(1e-12).rsqrt();
+    Eigen::MatrixXd draws(deviation.size(), static_cast<Eigen::Index>(geometry::kPoseSamples));
+    core::SplitMix random(kSeedOfDraws);
+    for (Eigen::Index s = 0; s < draws.cols(); ++s) {
+      for (Eigen::Index i = 0; i < draws.rows(); ++i) draws(i, s) = deviation[i] * normal(random);
+      draws.col(s) = solver.permutationPinv() * solver.matrixU().solve(draws.col(s)).eval();
     }
-    for (std::size_t l = 0; l < links_.size(); ++l)
-      add(links_[l].first, links_[l].second, links_[l].correction.motion, weights[l] * trust_[l]);
+    return draws;
+  }
 
-    Eigen::SparseMatrix<double> left(size, size);
-    left.setFromTriplets(entries_.begin(), entries_.end());
-    return Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>(left).solve(right_);
+  /// Motion of an anchor about the world's origin, less that of the path as a whole.
+  [[nodiscard]] std::vector<Vector6d> without_whole(const Eigen::VectorXd& x) const {
+    std::vector<Eigen::Vector3d> before, after;
+    for (std::size_t a = 0; a < anchors_.size(); ++a) {
+      before.push_back(anchors_[a].world_from_camera.translation);
+      after.push_back(moved(a, x));
+    }
+    const Rigid3 whole = geometry::align_points(before, after);
+    const Eigen::Vector3d turn = geometry::log_so3(whole.rotation);
+
+    std::vector<Vector6d> motions;
+    for (std::size_t a = 0; a < anchors_.size(); ++a) {
+      Vector6d motion = of(x, a);
+      motion.tail<3>() -= turn;
+      motion.head<3>() = after[a] - whole * before[a] - motion.tail<3>().cross(before[a]);
+      motions.push_back(motion);
+    }
+    return motions;
   }
 
   /// Weight of Geman and McClure.
@@ -91,6 +112,28 @@ class Equations {
   }
 
  private:
+  /// The equations' left side; right_ becomes the other one. `all_tied`: one path is tied to the next, too.
+  Eigen::SparseMatrix<double> matrix(const std::vector<double>& weights, bool all_tied) {
+    const auto size = static_cast<Eigen::Index>(6 * anchors_.size());
+    entries_.clear();
+    right_ = Eigen::VectorXd::Zero(size);
+    for (Eigen::Index i = 0; i < size; ++i) entries_.emplace_back(i, i, i < 6 ? 1e9 : 1e-6);
+
+    for (std::size_t a = 0; a + 1 < anchors_.size(); ++a) {
+      const bool next = anchors_[a].way == anchors_[a + 1].way;
+      if (!next && !all_tied) continue;
+      const double seconds = next ? std::max(0.03, anchors_[a + 1].stamp - anchors_[a].stamp) : kApart_s;
+      const double tie = 1.0 / (kTie_per_root_s * kTie_per_root_s * seconds);
+      add(a, a + 1, Vector6d::Zero(), diagonal(tie, tie));
+    }
+    for (std::size_t l = 0; l < links_.size(); ++l)
+      add(links_[l].first, links_[l].second, links_[l].correction.motion, weights[l] * trust_[l]);
+
+    Eigen::SparseMatrix<double> left(size, size);
+    left.setFromTriplets(entries_.begin(), entries_.end());
+    return left;
+  }
+
   static Vector6d of(const Eigen::VectorXd& x, std::size_t anchor) {
     return x.segment<6>(static_cast<Eigen::Index>(6 * anchor));
   }
@@ -147,6 +190,22 @@ GraphReport put_together(const std::vector<GraphAnchor>& anchors, const std::vec
     sum += report.shift_m[a] * report.shift_m[a];
   }
   report.rms_m = std::sqrt(sum / static_cast<double>(anchors.size()));
+
+  // The path keeps its place in what was found, and in draws of what may remain.
+  report.found = equations.without_whole(found);
+  report.draws.resize(anchors.size());
+  const Eigen::MatrixXd draws = equations.draw(report.weight);
+  double squares = 0.0;
+  for (Eigen::Index s = 0; s < draws.cols(); ++s) {
+    const std::vector<Vector6d> motions = equations.without_whole(draws.col(s));
+    for (std::size_t a = 0; a < anchors.size(); ++a) {
+      const Eigen::Vector3d& at = anchors[a].world_from_camera.translation;
+      squares += (motions[a].head<3>() + motions[a].tail<3>().cross(at)).squaredNorm();
+      report.draws[a][static_cast<std::size_t>(s)] = motions[a];
+    }
+  }
+  report.draws_rms_m =
+      std::sqrt(squares / static_cast<double>(draws.cols()) / static_cast<double>(anchors.size()));
   return report;
 }
 

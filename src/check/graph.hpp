@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pair.hpp"
+#include "plumbline/geometry/pose_samples.hpp"
 
 namespace plumbline::check {
 
@@ -25,6 +26,11 @@ struct GraphReport {
   double rms_m = 0.0;           ///< of the anchors' shifts, after a rigid alignment
   std::vector<double> shift_m;  ///< by anchor
   std::vector<double> weight;   ///< by link, 1: it agrees with the others, 0: it is refused
+  /// By anchor, motions (t, w) in the world about its origin that do not move the path as a whole: the one
+  /// that was found, and draws from the covariance of all.
+  std::vector<geometry::Vector6d> found;
+  std::vector<geometry::PoseSamples> draws;
+  double draws_rms_m = 0.0;  ///< of the anchors' shifts in these
 };
 
 /// Anchors are by way, in order. Fewer than three, or no link: an empty report.

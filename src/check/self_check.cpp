@@ -12,6 +12,7 @@
 #include "pair.hpp"
 #include "pair_choice.hpp"
 #include "plumbline/core/numbers.hpp"
+#include "samples.hpp"
 #include "verdict.hpp"
 
 namespace plumbline::check {
@@ -222,11 +223,15 @@ class Check {
     for (const std::size_t a : anchors_) box.extend(frames_[a].poses.world_from_depth.translation);
     if (!anchors_.empty()) report.size_m = box.diagonal().norm() + 2.0 * report.distance_m;
 
+    std::vector<GraphAnchor> anchors;
+    for (const std::size_t a : anchors_)
+      anchors.push_back({frames_[a].poses.world_from_depth, frames_[a].frame.way, frames_[a].frame.stamp});
     set_split(report);
-    set_graph(report);
+    const GraphReport graph = set_graph(anchors, report);
     set_local(report);
     set_steps(report);
     judge(report);
+    report.samples = possible_errors(report, anchors, graph);
     return report;
   }
 
@@ -241,11 +246,7 @@ class Check {
     report.split_chi = core::quantile(chis, 0.5, 0.0);
   }
 
-  void set_graph(CheckReport& report) const {
-    std::vector<GraphAnchor> anchors;
-    for (const std::size_t a : anchors_)
-      anchors.push_back({frames_[a].poses.world_from_depth, frames_[a].frame.way, frames_[a].frame.stamp});
-
+  GraphReport set_graph(const std::vector<GraphAnchor>& anchors, CheckReport& report) const {
     std::vector<PairLink> links;
     std::size_t refused = 0;
     for (const auto& pairs : pairs_) {
@@ -267,6 +268,7 @@ class Check {
     }
     for (const double weight : graph.weight) refused += weight < kRefused ? 1U : 0U;
     if (report.pairs > 0) report.refused = static_cast<double>(refused) / static_cast<double>(report.pairs);
+    return graph;
   }
 
   /// A pair's shift at both of its anchors.

@@ -16,6 +16,8 @@ constexpr double kLocal = 0.35;
 constexpr double kThirds = 1.3;
 constexpr double kSeconds = 0.5;
 constexpr double kP95 = 1.8;
+/// Share of the path's length by which it may drift where nothing is seen twice.
+constexpr double kDrift = 0.0005;
 
 /// Limits beyond which a path is not trusted; shares are of the distance.
 struct Limit {
@@ -72,8 +74,11 @@ double least_local(const CheckReport& report) {
   return std::max(0.003, 5.0 * report.align[kSecond].median_m);
 }
 
+double found_share() { return kGraph; }
+
 void judge(CheckReport& report) {
-  report.expected_m = expected_m(report);
+  if (report.checked() && report.align[kRevisit].pairs == 0) report.drift_m = kDrift * report.path_m;
+  report.expected_m = std::hypot(expected_m(report), report.drift_m);
   report.p95_m = kP95 * report.expected_m;
   if (report.size_m > 0.0) report.lengths = std::sqrt(2.0) * report.expected_m / report.size_m;
 

@@ -8,7 +8,10 @@ namespace plumbline::check {
 /// The least shift at one place that stands out, metres.
 double least_local(const CheckReport& report);
 
-/// Fills in expected_m, p95_m, reasons and unchecked from the other numbers.
+/// Share of graph_m that counts in expected_m.
+double found_share();
+
+/// Fills in drift_m, expected_m, p95_m, reasons and unchecked from the other numbers.
 void judge(CheckReport& report);
 
 }  // namespace plumbline::check

@@ -25,6 +25,9 @@ std::vector<Sign> signs_of(const Samples& samples) {
   return all;
 }
 
-std::string sentence(const Sign& sign) { return sign.text + ". To do: " + sign.remedy; }
+std::string sentence(const Sign& sign) {
+  const bool typed = sign.remedy.rfind("--", 0) == 0;
+  return sign.text + (typed ? ". Type: " : ". To do: ") + sign.remedy;
+}
 
 }  // namespace plumbline::diagnose

@@ -5,7 +5,7 @@
 usage: trust_worlds.py PROGRAM WORK [DATA]    DATA: a folder of recordings with groundtruth.txt; WORK keeps everything
 
 The list of bases is frozen; even ones tune, odd ones test. Needs nothing but Python 3. Prints Markdown tables.
-Environment: ONLY=tuning|test; WORLDS=N: the first ones; AGAIN=1 checks the kept results again.
+Environment: ONLY=tuning|test; WORLDS=N: the first ones; FIRST=N: from there on; AGAIN=1 checks the kept results again.
 """
 import json, math, os, random, shutil, subprocess, sys
 
@@ -26,7 +26,7 @@ STARTS = [0, 0.2, 0.4, 0.6, 0.8]
 
 
 def worlds():
-    for i in range(int(os.environ.get('WORLDS', 42))):
+    for i in range(int(os.environ.get('FIRST', 0)), int(os.environ.get('WORLDS', 42))):
         scene, sensor = SCENES[i % 5], SENSORS[i % 7]
         options = f'--seed {300 + i} --sensor {sensor} --fps {FPS} --frames {FRAMES} --width 320 --height 240'
         if scene != 'room': options += f' --layout {300 + i} --path {"wander" if i % 4 == 3 else "tour"}'

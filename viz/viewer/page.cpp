@@ -113,6 +113,31 @@ Json path_json(const CameraPath& path, bool z_up) {
   return json;
 }
 
+/// Errors of a keyframe's pose, in the axes that are shown: "e" has the steps of shift and turn, "s" numbers
+/// of them, 16 bits each, of all samples.
+void add_samples(const Keyframe& keyframe, bool z_up, Json& json) {
+  std::vector<double> motions;
+  std::array<double, 2> most{1e-12, 1e-12};
+  for (const geometry::Vector6d& motion : *keyframe.in_camera) {
+    if (!motion.allFinite()) return;
+    for (const int part : {0, 1}) {
+      const Eigen::Vector3d v =
+          shown(keyframe.world_from_camera.rotation * motion.segment<3>(3 * part), z_up);
+      motions.insert(motions.end(), v.data(), v.data() + 3);
+      auto& of_part = most[static_cast<std::size_t>(part)];
+      of_part = std::max(of_part, v.lpNorm<Eigen::Infinity>());
+    }
+  }
+
+  std::string bytes;
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    const auto step = static_cast<std::uint16_t>(std::lround(32000.0 * motions[i] / most[i / 3 % 2]));
+    bytes += {static_cast<char>(step & 0xFFU), static_cast<char>(step >> 8U)};
+  }
+  json["e"] = {most[0] / 32000.0, most[1] / 32000.0};
+  json["s"] = base64(bytes);
+}
+
 Json segments_json(const std::vector<Segment>& segments, bool z_up) {
   Json json = Json::array();
   for (const auto& [from, to] : segments) {
@@ -170,6 +195,7 @@ Json scene_json(const Scene& scene, Pieces& pieces, Cost& cost) {
                      {"p", numbers(shown(k.world_from_camera.translation, scene.z_up))},
                      {"q", turn_of(k.world_from_camera, scene.z_up)}};
     if (!k.jpeg.empty()) keyframe["i"] = base64(k.jpeg);
+    if (k.in_camera) add_samples(k, scene.z_up, keyframe);
     json["keyframes"].push_back(std::move(keyframe));
   }
 

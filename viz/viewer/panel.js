@@ -437,7 +437,7 @@ class Panel {
     return {
       c: view.camera.state.map(round), l: view.layer.key, s: this.shows, b: view.blend,
       k: view.cut.kind === 'none' ? undefined : [view.cut.kind, ...view.cut.low.map(round), ...view.cut.high.map(round)],
-      m: this.measuring.list.map((m) => [m.tool, ...m.points.map((q) => [...q.p.map(round), Number.isFinite(q.sigma) ? round(q.sigma) : null])]),
+      m: this.measuring.list.map((m) => [m.tool, ...m.points.map((q) => [...q.p.map(round), Number.isFinite(q.sigma) ? round(q.sigma) : null, q.seen])]),
     };
   }
   link() { return `${location.href.replace(/#.*/, '')}#view=${encodeURIComponent(JSON.stringify(this.state()))}`; }
@@ -455,7 +455,7 @@ class Panel {
       if (s.k) this.cutBy(s.k[0], { kind: s.k[0], low: s.k.slice(1, 4), high: s.k.slice(4, 7) });
       if (this.blends) this.blendBy(this.blends.value = s.b);
       for (const [tool, ...points] of s.m) {
-        const m = { tool, points: points.map(([x, y, z, sigma]) => ({ p: [x, y, z], sigma: sigma ?? NaN, seen: -1 })) };
+        const m = { tool, points: points.map(([x, y, z, sigma, seen = -1]) => ({ p: [x, y, z], sigma: sigma ?? NaN, seen })) };
         this.measuring.list.push(m);
         this.measuring.describe(m);
       }

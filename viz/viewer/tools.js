@@ -70,12 +70,37 @@ class Measuring {
 
   textOfPoint({ p, sigma }) { return `point ${coordinates(this.view.ofMap(p))}${Number.isFinite(sigma) ? ` (σ ${millimetres(sigma)})` : ''}`; }
 
+  /** Motions of a point with the keyframe that saw it, one for each sample of the poses' errors; null: not known. */
+  motions({ p, seen }) {
+    const k = this.view.scene.keyframes[seen];
+    if (!k || !k.s) return null;
+    k.steps = k.steps || new Int16Array(bytesOf(k.s).buffer);
+    const arm = sub(p, this.view.local(k.p)), all = [];
+    for (let i = 0; i < k.steps.length; i += 6) {
+      const part = (at, step) => [0, 1, 2].map((a) => k.steps[at + a] * step);
+      all.push(add(part(i, k.e[0]), cross(part(i + 3, k.e[1]), arm)));
+    }
+    return all;
+  }
+
+  /** RMS by which the samples of the poses' errors change the length of a line; NaN: not known. */
+  spread(points, way) {
+    const all = points.map((q) => this.motions(q));
+    if (!all.every((q) => q)) return NaN;
+    let sum = 0;
+    for (let s = 0; s < all[0].length; ++s) {
+      const moved = points.map(({ p }, i) => add(p, all[i][s]));
+      sum += (wayOf(moved) - way) ** 2;
+    }
+    return Math.sqrt(sum / all[0].length);
+  }
+
   describe(m) {
     const p = m.points.map((point) => point.p), sum = m.points.reduce((s, { sigma }) => s + sigma ** 2, 0), { view } = this;
     const step = view.clouds[0].step, error = Math.sqrt(sum + m.points.length * step * step / 12);
-    const within = Number.isFinite(error) ? ` ± ${millimetres(error)}` : '';
-    let way = 0;
-    for (let i = 1; i < p.length; ++i) way += length(sub(p[i], p[i - 1]));
+    let within = Number.isFinite(error) ? ` ± ${millimetres(error)}` : '';
+    const way = wayOf(p), spread = m.tool === 'distance' || m.tool === 'line' ? this.spread(m.points, way) : NaN;
+    if (Number.isFinite(spread)) within = ` ± ${millimetres(2.04 * Math.hypot(spread, error || 0))} (95 %)`;
     m.value = m.tool === 'area' ? areaOf(p) : way;
     if (m.tool === 'point') m.text = this.textOfPoint(m.points[0]);
     if (m.tool === 'height') {
@@ -115,6 +140,9 @@ class Measuring {
 
   text() { return this.list.map((m) => m.text).join('\n'); }
 }
+
+/** Length of a line through points. */
+const wayOf = (p) => p.slice(1).reduce((sum, q, i) => sum + length(sub(q, p[i])), 0);
 
 /** Area of a polygon in space, seen along the direction in which it is largest. */
 function areaOf(p) {

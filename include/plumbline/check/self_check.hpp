@@ -14,6 +14,7 @@
 #include "plumbline/check/frame_store.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/executor.hpp"
+#include "plumbline/geometry/pose_samples.hpp"
 #include "plumbline/geometry/trajectory.hpp"
 #include "plumbline/sensor/camera.hpp"
 
@@ -61,6 +62,13 @@ struct BadPlace {
   std::size_t way = 0;
 };
 
+/// Errors that the path may have at an anchor, in the axes of the world.
+struct AnchorSamples {
+  double stamp = 0.0;  ///< seconds
+  std::size_t way = 0;
+  geometry::PoseSamples world;
+};
+
 struct CheckReport {
   std::size_t anchors = 0;  ///< frames that pairs begin with
   std::size_t tried = 0;    ///< pairs of frames that should show the same surface
@@ -73,6 +81,9 @@ struct CheckReport {
   BadPlace local;               ///< where frames a second apart fit worst, if it stands out; off_m 0: nowhere
   std::vector<BadPlace> tears;  ///< steps that no camera makes, or that the pictures contradict
   std::vector<BadPlace> along;  ///< of each anchor: the shift that pairs around it and all together ask for
+  std::vector<AnchorSamples>
+      samples;           ///< by way, in order of their stamps: their RMS is expected_m; path_samples.hpp
+  double drift_m = 0.0;  ///< what a path may have drifted by that sees nothing twice; else 0
   std::array<double, 2> noise{};     ///< of depth: a + b z^2, metres
   double distance_m = 0.0;           ///< median depth
   double path_m = 0.0;               ///< length of all paths

@@ -4,11 +4,12 @@
 // A map as a page in the browser shows it: points with their layers, paths, lines, the plan.
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/geometry/pose_samples.hpp"
 
 namespace plumbline::viewer {
 
@@ -58,6 +59,8 @@ struct Keyframe {
   double stamp = 0.0;
   geometry::Rigid3 world_from_camera;
   std::string jpeg;  ///< small picture; empty: there is none
+  std::optional<geometry::PoseSamples> in_camera =
+      {};  ///< errors that the pose may have, in the camera's axes
 };
 
 using Segment = std::pair<Eigen::Vector3d, Eigen::Vector3d>;

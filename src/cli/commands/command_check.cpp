@@ -13,12 +13,13 @@
 
 #include "app.hpp"
 #include "paths.hpp"
-#include "plumbline/check/self_check.hpp"
+#include "plumbline/check/path_samples.hpp"
 #include "plumbline/core/numbers.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/dataset/live.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/maps/output_check.hpp"
+#include "plumbline/maps/pose_samples.hpp"
 #include "plumbline/pipeline/input.hpp"
 #include "terminal/print.hpp"
 
@@ -30,7 +31,7 @@ namespace fs = std::filesystem;
 struct CheckRequest {
   fs::path path;
   std::string recording;
-  fs::path json;
+  fs::path json, samples;
   double max_dt_s = 0.005;
   dataset::OpenOptions open;
 };
@@ -139,14 +140,24 @@ core::Result<check::CheckReport> check_recording(const CheckRequest& request, Se
   }
 
   input.read = [&store](std::size_t number) { return store.read(number); };
-  return check::check_path(input, session.executor());
+  auto report = check::check_path(input, session.executor());
+  if (!report || request.samples.empty()) return report;
+
+  // Errors that each pose may have.
+  std::vector<maps::KeyframeSamples> samples;
+  for (const geometry::StampedPose& pose : input.ways.front().path)
+    samples.push_back({{0, static_cast<std::int32_t>(samples.size())}, check::samples_of(*report, 0, pose)});
+  if (auto written = maps::write_pose_samples(request.samples, samples); !written)
+    return tl::unexpected<core::Error>(written.error());
+  return report;
 }
 
 int check_and_tell(const CheckRequest& request, Session& session) {
-  if (!request.json.empty()) {
-    if (auto fit = maps::check_output(request.json, {request.path, request.recording}); !fit)
+  for (const fs::path& file : {request.json, request.samples}) {
+    if (file.empty()) continue;
+    if (auto fit = maps::check_output(file, {request.path, request.recording}); !fit)
       return session.fail(fit.error());
-    if (auto fit = core::check_writable(request.json); !fit) return session.fail(fit.error());
+    if (auto fit = core::check_writable(file); !fit) return session.fail(fit.error());
   }
 
   const auto report = check_recording(request, session);
@@ -188,6 +199,10 @@ void add_check(CLI::App& app, Session& session) {
       ->check(CLI::Range(1e-6, 10.0));
 
   command->add_option("--json", request->json, "Also write the numbers into this file")->type_name("FILE");
+  command
+      ->add_option("--samples", request->samples,
+                   "Also write 32 errors that each pose may have, drawn together (NumPy), into this file")
+      ->type_name("FILE.npy");
   add_topic_option(*command, request->open);
   add_time_range(*command, request->open);
   add_progress_option(*command, session);

@@ -22,6 +22,7 @@
 #include "plans/walls.hpp"
 #include "plumbline/cloud/columns.hpp"
 #include "plumbline/core/output_file.hpp"
+#include "plumbline/maps/pose_samples.hpp"
 #include "plumbline/viewer/page.hpp"
 
 namespace plumbline::exports {
@@ -170,6 +171,20 @@ void add_paths(const MapSource& source, viewer::Scene& scene) {
   }
 }
 
+/// Errors that the keyframes' poses may have; none if the map was not checked.
+void add_samples(const MapSource& source, const std::vector<ExportPose>& poses, viewer::Scene& scene) {
+  const auto& result = source.place().result;
+  if (!result) return;
+  const auto samples = maps::read_pose_samples(result->folder / maps::kPoseSamplesFile);
+  if (!samples) return;
+  std::map<core::KeyframeId, const geometry::PoseSamples*> known;
+  for (const maps::KeyframeSamples& one : *samples) known[one.keyframe] = &one.in_camera;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const auto found = known.find(poses[i].keyframe);
+    if (found != known.end()) scene.keyframes[i].in_camera = *found->second;
+  }
+}
+
 /// Keyframes with their pictures, what each of them saw best, and the loops between them.
 core::Result<void> add_keyframes(const MapSource& source, const cloud::CloudFile& file, MapView& view) {
   const auto poses = source.poses(true);
@@ -182,9 +197,10 @@ core::Result<void> add_keyframes(const MapSource& source, const cloud::CloudFile
       numbers[pose.keyframe] = view.scene.keyframes.size();
       places[pose.keyframe] = pose.world_from_camera.translation;
     }
-    view.scene.keyframes.push_back({pose.robot, pose.stamp, pose.world_from_camera, {}});
+    view.scene.keyframes.push_back({pose.robot, pose.stamp, pose.world_from_camera, {}, {}});
   }
 
+  add_samples(source, *poses, view.scene);
   add_thumbnails(source, *poses, view);
   if (!source.has_store()) return {};
 

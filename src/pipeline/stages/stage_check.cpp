@@ -8,9 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "plumbline/check/path_samples.hpp"
 #include "plumbline/check/recalibrated_frame.hpp"
 #include "plumbline/check/self_check.hpp"
 #include "plumbline/core/json.hpp"
+#include "plumbline/maps/pose_samples.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "results/resumed_run.hpp"
 #include "stages/stages.hpp"
@@ -75,6 +77,10 @@ class CheckStage : public Stage {
     table.boolean("enabled", enabled_, "Judge the final path by aligning pairs of frames again");
   }
 
+  [[nodiscard]] std::vector<std::string> files() const override {
+    return enabled_ ? std::vector<std::string>{maps::kPoseSamplesFile} : std::vector<std::string>();
+  }
+
   core::Result<void> start(const RunContext& context) override {
     context_ = &context;
     if (!enabled_) return {};
@@ -128,7 +134,7 @@ class CheckStage : public Stage {
     auto report = check::check_path(input, *context_->executor);
     if (!report) return tl::unexpected(report.error());
     report_ = std::move(*report);
-    return {};
+    return write_samples(*map, robots);
   }
 
   void report(Json& summary) const override {
@@ -151,6 +157,21 @@ class CheckStage : public Stage {
     if (use == check::FrameChoice::Use::kNone) return;
     const std::size_t stored = store_->add(check::shrink(frame, recordings().robot(robot).camera.color));
     kept_[number].push_back({stored, number, frame.stamp, frame.depth_stamp, use});
+  }
+
+  /// Errors that the keyframes' poses may have.
+  [[nodiscard]] core::Result<void> write_samples(const MapResult& map,
+                                                 const std::vector<RobotInfo>& robots) const {
+    if (report_->samples.empty()) return {};
+    std::vector<maps::KeyframeSamples> samples;
+    for (const maps::KeyframePose& keyframe : map.keyframes) {
+      const auto robot = std::find_if(robots.begin(), robots.end(),
+                                      [&](const RobotInfo& r) { return r.number == keyframe.id.robot; });
+      const geometry::StampedPose pose{keyframe.stamp, keyframe.world_from_camera};
+      samples.push_back(
+          {keyframe.id, check::samples_of(*report_, static_cast<std::size_t>(robot - robots.begin()), pose)});
+    }
+    return maps::write_pose_samples(context_->output_folder / maps::kPoseSamplesFile, samples);
   }
 
   /// Reads the frames again that the continued run had kept: its temporary file is gone.

@@ -43,6 +43,13 @@ class Keyframes(NamedTuple):
     robots: npt.NDArray[np.str_]
 
 
+class Length(NamedTuple):
+    """A length in metres; the true one lies within +- `within` of it with a probability of 95 %, but for the scale."""
+
+    metres: float
+    within: float
+
+
 class Landmarks(NamedTuple):
     """Points of the sparse map, and M observations of them: their tracks.
 
@@ -209,6 +216,44 @@ class Result:
             np.array([known.get(name, -1) for name in names], np.int64),
             column("sigma_position"), column("sigma_rotation"), np.array([robot for robot, _ in names], np.str_),
         )
+
+    @functools.cached_property
+    def pose_samples(self) -> npt.NDArray[np.float32]:
+        """N x 32 x 6, one row for each of `keyframes`: 32 errors that the poses may have, drawn together. Each is a shift
+        (metres) and a turn (radians) in the camera's axes. Raises InputError: the path was not checked."""
+        file = self.folder / "pose_samples.npy"
+        try:
+            records = np.load(file)
+        except (OSError, ValueError) as problem:
+            raise _core.InputError(f"{file}: cannot be read: {problem}; results whose path was checked have it") from problem
+        return records["motion"]
+
+    def length(self, points: npt.ArrayLike, seen: Optional[npt.ArrayLike] = None) -> Length:
+        """Length of the line through P x 3 points of the map, with its 95 %: what the poses' errors can change.
+
+        seen: rows of `keyframes` by which each point was measured; None: of those that have it in view the nearest.
+        """
+        p = np.asarray(points, np.float64).reshape(-1, 3)
+        rows = np.array([self._nearest_view(q) for q in p], np.int64) if seen is None else np.asarray(seen, np.int64)
+        turn = self.keyframes.poses[rows, :3, :3]
+        arm = np.einsum("nji,nj->ni", turn, p - self.keyframes.poses[rows, :3, 3])
+        motion = self.pose_samples[rows].astype(np.float64)
+        shift = motion[..., :3] + np.cross(motion[..., 3:], arm[:, np.newaxis])
+        moved = p[:, np.newaxis] + np.einsum("nij,nsj->nsi", turn, shift)
+
+        metres = float(np.linalg.norm(np.diff(p, axis=0), axis=-1).sum())
+        drawn = np.linalg.norm(np.diff(moved, axis=0), axis=-1).sum(axis=0)
+        return Length(metres, float(2.04 * np.sqrt(np.mean((drawn - metres) ** 2))))  # Student's, of 32 draws
+
+    def _nearest_view(self, point: npt.NDArray[np.float64]) -> int:
+        """Row of the keyframe nearest to a point among those that have it in view, else of the nearest one."""
+        poses, camera = self.keyframes.poses, self.camera
+        local = np.einsum("nji,nj->ni", poses[:, :3, :3], point - poses[:, :3, 3])
+        z = np.maximum(local[:, 2], 1e-6)
+        u, v = camera.fx * local[:, 0] / z + camera.cx, camera.fy * local[:, 1] / z + camera.cy
+        inside = (local[:, 2] > 0.1) & (u >= 0) & (v >= 0) & (u < camera.width) & (v < camera.height)
+        distance = np.linalg.norm(local, axis=1)
+        return int(np.argmin(np.where(inside | ~inside.any(), distance, np.inf)))
 
     @functools.cached_property
     def lines(self) -> npt.NDArray[np.float64]:

@@ -107,13 +107,14 @@ std::string what_is(const std::string& name) {
     const char* what;
   };
 
-  static constexpr std::array<Known, 14> kKnown{
+  static constexpr std::array<Known, 15> kKnown{
       {{"map.ply", "merged cloud: position, normal, colour, confidence, observations, sigma"},
        {"map.pcd", "the same for PCL"},
        {"map.db", "the map itself: for fuse, export, render and --resume"},
        {"trajectory.txt", "camera poses of the tracked frames, TUM format"},
        {"keyframes.txt", "camera poses of the keyframes, TUM format"},
        {"keyframes.csv", "the same with their accuracy and number of constraints"},
+       {"pose_samples.npy", "errors that the keyframes' poses may have, for lengths with their 95 %"},
        {"lines.ply", "3D lines as edges"},
        {"frames.csv", "one line a frame: what tracking saw and decided"},
        {"timing.csv", "one line a frame: milliseconds by stage, memory"},

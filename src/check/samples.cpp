@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "samples.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+
+#include "plumbline/check/path_samples.hpp"
+#include "verdict.hpp"
+
+namespace plumbline::check {
+namespace {
+
+using geometry::PoseSamples;
+using geometry::Vector6d;
+
+/// E is the RMS error of half of the results; samples are wider, so that 95 % intervals hold for 95 % of the
+/// lengths in all of them (docs/method/trust.md).
+constexpr double kWider = 1.0;
+constexpr std::uint64_t kSeedOfSigns = 32;
+
+/// Numbers of mean square 1.
+std::array<double, geometry::kPoseSamples> factors() {
+  core::SplitMix random(kSeedOfSigns);
+  std::array<double, geometry::kPoseSamples> all{};
+  double sum = 0.0;
+  for (double& one : all) {
+    one = normal(random);
+    sum += one * one;
+  }
+  for (double& one : all) one /= std::sqrt(sum / static_cast<double>(all.size()));
+  return all;
+}
+
+}  // namespace
+
+double normal(core::SplitMix& random) {
+  double sum = -6.0;
+  for (int i = 0; i < 12; ++i) sum += static_cast<double>(random.next() >> 11U) * 0x1p-53;
+  return sum;
+}
+
+std::vector<AnchorSamples> possible_errors(const CheckReport& report, const std::vector<GraphAnchor>& anchors,
+                                           const GraphReport& graph) {
+  if (graph.draws.empty()) return {};
+  const double share = found_share();
+  const double found_m = share * graph.rms_m;
+  const double rest_m = std::sqrt(std::max(0.0, report.expected_m * report.expected_m - found_m * found_m));
+  const double of_draws = kWider * rest_m / std::max(1e-9, graph.draws_rms_m);
+  const auto of_found = factors();
+
+  std::vector<AnchorSamples> all;
+  for (std::size_t a = 0; a < anchors.size(); ++a) {
+    AnchorSamples one{anchors[a].stamp, anchors[a].way, {}};
+    for (std::size_t s = 0; s < of_found.size(); ++s)
+      one.world[s] = kWider * share * of_found[s] * graph.found[a] + of_draws * graph.draws[a][s];
+    all.push_back(one);
+  }
+  return all;
+}
+
+PoseSamples samples_of(const CheckReport& report, std::size_t way, const geometry::StampedPose& pose) {
+  const auto begin = std::find_if(report.samples.begin(), report.samples.end(),
+                                  [&](const AnchorSamples& a) { return a.way == way; });
+  const auto end =
+      std::find_if(begin, report.samples.end(), [&](const AnchorSamples& a) { return a.way != way; });
+  PoseSamples samples;
+  samples.fill(Vector6d::Constant(std::numeric_limits<double>::quiet_NaN()));
+  if (begin == end) return samples;
+
+  // Between the anchors before and after.
+  const auto after = std::find_if(begin, end, [&](const AnchorSamples& a) { return a.stamp >= pose.stamp; });
+  const auto last = after == end ? std::prev(end) : after;
+  const auto first = last == begin || after == end ? last : std::prev(last);
+  const double gap_s = last->stamp - first->stamp;
+  const double at = gap_s > 0.0 ? (pose.stamp - first->stamp) / gap_s : 0.0;
+
+  // In the camera's axes, about the camera.
+  const Eigen::Matrix3d back = pose.world_from_camera.rotation.transpose();
+  for (std::size_t s = 0; s < samples.size(); ++s) {
+    const Vector6d motion = (1.0 - at) * first->world[s] + at * last->world[s];
+    const Eigen::Vector3d turn = motion.tail<3>();
+    samples[s] << back * (motion.head<3>() + turn.cross(pose.world_from_camera.translation)), back * turn;
+  }
+  return samples;
+}
+
+}  // namespace plumbline::check

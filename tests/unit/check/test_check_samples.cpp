@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Errors that the poses of a path may have, in a box whose walls are rendered at true poses.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <random>
+
+#include "plumbline/check/path_samples.hpp"
+
+namespace plumbline::check {
+namespace {
+
+using geometry::Rigid3;
+
+const sensor::Pinhole kCamera{160, 120, 130.0, 130.0, 79.5, 59.5};
+const Eigen::Vector3d kHalf(2.5, 1.3, 2.0);  // of the box
+constexpr double kStep_s = 1.0 / 3.0;
+
+/// On a circle, looking outwards.
+Rigid3 true_pose(double stamp) {
+  const double angle = 0.25 * stamp;
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  return {turn, turn * Eigen::Vector3d(0.0, 0.1 * std::sin(stamp), 0.7)};
+}
+
+/// Patches of grey by place.
+std::uint8_t grey_at(const Eigen::Vector3d& p) {
+  const Eigen::Vector3i cell = (p / 0.17).array().floor().cast<int>();
+  const int mixed = cell.x() * 7919 + cell.y() * 104729 + cell.z() * 1299709;
+  return static_cast<std::uint8_t>(40 + (mixed & 0x7fffffff) % 170);
+}
+
+SmallFrame film(double stamp) {
+  SmallFrame frame;
+  frame.stamp = frame.depth_stamp = stamp;
+  frame.gray.create(kCamera.height, kCamera.width, CV_8UC1);
+  frame.depth.create(kCamera.height, kCamera.width, CV_16UC1);
+  const Rigid3 pose = true_pose(stamp);
+  for (int v = 0; v < kCamera.height; ++v) {
+    for (int u = 0; u < kCamera.width; ++u) {
+      const Eigen::Vector3d ray = pose.rotation * kCamera.unproject(u, v, 1.0);
+      double z = 100.0;
+      for (int k = 0; k < 3; ++k)
+        z = std::min(z, (std::copysign(kHalf[k], ray[k]) - pose.translation[k]) / ray[k]);
+      frame.gray.at<std::uint8_t>(v, u) = grey_at(pose.translation + (z - 1e-6) * ray);
+      frame.depth.at<std::uint16_t>(v, u) = static_cast<std::uint16_t>(std::lround(z * kDepthUnits_per_m));
+    }
+  }
+  return frame;
+}
+
+/// The report on a path whose positions are off by offset(stamp).
+template <typename Offset>
+std::pair<CheckReport, geometry::Trajectory> checked(const Offset& offset, int threads) {
+  CheckInput input;
+  input.ways.push_back({kCamera, 0.0, {}});
+  for (std::size_t i = 0; i < 60; ++i) {
+    const double stamp = kStep_s * static_cast<double>(i);
+    Rigid3 pose = true_pose(stamp);
+    pose.translation += offset(stamp);
+    input.ways.front().path.push_back({stamp, pose});
+    input.frames.push_back({i, 0, stamp, stamp, FrameChoice::Use::kAnchor});
+  }
+  input.read = [](std::size_t number) -> core::Result<SmallFrame> {
+    return film(kStep_s * static_cast<double>(number));
+  };
+  return {*check_path(input, core::Executor(threads)), input.ways.front().path};
+}
+
+Eigen::Vector3d bent(double stamp) { return {0.015 * std::sin(1.3 * stamp), 0.0, 0.001 * stamp}; }
+
+/// A point before the camera of a pose, and where a sample of its error puts it.
+Eigen::Vector3d before(const Rigid3& pose) { return pose * Eigen::Vector3d(0.3, 0.1, 1.6); }
+Eigen::Vector3d moved(const Rigid3& pose, const geometry::Vector6d& motion) {
+  const Eigen::Vector3d turn = motion.tail<3>();
+  return pose *
+         (Eigen::Vector3d(0.3, 0.1, 1.6) + motion.head<3>() + turn.cross(Eigen::Vector3d(0.3, 0.1, 1.6)));
+}
+
+TEST(CheckSamples, IntervalsHoldTrueLengthsAndAreNotWide) {
+  const auto [report, path] = checked(bent, 2);
+  ASSERT_EQ(report.samples.size(), path.size());
+  std::vector<geometry::PoseSamples> samples;
+  for (const geometry::StampedPose& pose : path) samples.push_back(samples_of(report, 0, pose));
+
+  std::mt19937 random(5);
+  int held = 0;
+  constexpr int kAll = 1000;
+  std::vector<double> errors, widths;
+  for (int n = 0; n < kAll; ++n) {
+    const std::size_t i = random() % path.size(), j = (i + 1 + random() % (path.size() - 1)) % path.size();
+    const Rigid3 &a = path[i].world_from_camera, &b = path[j].world_from_camera;
+    const double told = (before(a) - before(b)).norm();
+    double sum = 0.0;
+    for (std::size_t s = 0; s < samples[i].size(); ++s)
+      sum += std::pow((moved(a, samples[i][s]) - moved(b, samples[j][s])).norm() - told, 2);
+    widths.push_back(2.04 * std::sqrt(sum / static_cast<double>(samples[i].size())));
+    errors.push_back(
+        std::abs((before(true_pose(path[i].stamp)) - before(true_pose(path[j].stamp))).norm() - told));
+    held += errors.back() < widths.back() ? 1 : 0;
+  }
+  std::sort(errors.begin(), errors.end());
+  std::sort(widths.begin(), widths.end());
+  EXPECT_GE(held, 850);
+  EXPECT_LE(widths[kAll / 2], 2.5 * errors[kAll * 95 / 100]);
+}
+
+TEST(CheckSamples, FollowTheErrorToExpectAndTheMotionThatWasFound) {
+  const auto [right, path] = checked([](double) { return Eigen::Vector3d::Zero(); }, 1);
+  const auto [wrong, other] = checked(bent, 1);
+  const auto [again, same] = checked(bent, 3);
+  const auto size = [](const CheckReport& report, const geometry::Trajectory& along) {
+    double sum = 0.0;
+    for (const geometry::StampedPose& pose : along) {
+      for (const geometry::Vector6d& motion : samples_of(report, 0, pose))
+        sum += motion.head<3>().squaredNorm();
+    }
+    return std::sqrt(sum / 32.0 / static_cast<double>(along.size()));
+  };
+  EXPECT_NEAR(size(wrong, other), size(right, path) * wrong.expected_m / right.expected_m,
+              0.1 * size(wrong, other));
+  EXPECT_GT(size(wrong, other), 2.0 * size(right, path));
+  for (std::size_t i = 0; i < same.size(); ++i)
+    EXPECT_EQ(samples_of(wrong, 0, other[i]), samples_of(again, 0, same[i])) << i;
+
+  // Another path, and one of which nothing is known.
+  EXPECT_TRUE(samples_of(wrong, 1, other[0])[0].hasNaN());
+  EXPECT_TRUE(samples_of({}, 0, other[0])[0].hasNaN());
+}
+
+TEST(CheckSamples, WhereNothingIsSeenTwiceTheErrorGrowsWithThePath) {
+  const auto [report, path] = checked(bent, 1);
+  EXPECT_EQ(report.align[kRevisit].pairs, 0U);
+  EXPECT_GT(report.drift_m, 0.0);
+  EXPECT_LT(report.drift_m, 0.01 * report.path_m);
+  EXPECT_GE(report.expected_m, report.drift_m);
+  EXPECT_NE(sentence(report).find("nothing was seen twice"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace plumbline::check
