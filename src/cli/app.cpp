@@ -240,9 +240,9 @@ int run(int argc, char** argv) {
 
   Session session;
   for (const auto add :
-       {add_map,     add_localize, add_fuse,   add_hub,       add_robot,  add_keys,      add_calibrate,
-        add_convert, add_info,     add_render, add_export,    add_report, add_view,      add_evaluate,
-        add_check,   add_synth,    add_filter, add_pipelines, add_play,   add_completion}) {
+       {add_map,      add_localize, add_fuse,   add_hub,    add_robot,     add_keys, add_calibrate,
+        add_convert,  add_info,     add_render, add_export, add_report,    add_view, add_compare,
+        add_evaluate, add_check,    add_synth,  add_filter, add_pipelines, add_play, add_completion}) {
     add(app, session);
   }
   refuse_empty_values(app);

@@ -122,6 +122,7 @@ void add_convert(CLI::App& app, Session& session);
 void add_info(CLI::App& app, Session& session);
 void add_render(CLI::App& app, Session& session);
 void add_export(CLI::App& app, Session& session);
+void add_compare(CLI::App& app, Session& session);
 void add_report(CLI::App& app, Session& session);
 void add_view(CLI::App& app, Session& session);
 void add_check(CLI::App& app, Session& session);

@@ -21,6 +21,7 @@ LAYERS = [
     ["tracking", "places", "evaluate", "synth", "viewer", "check"],
     ["mapping", "inertial"],
     ["viz", "exports", "localize"],
+    ["changes"],
     ["pipeline", "report"],
     ["net"],
     ["cli", "python"],

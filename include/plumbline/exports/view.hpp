@@ -2,10 +2,12 @@
 #pragma once
 
 // A map as the scene of a page that turns it in the browser (plumbline/viewer/page.hpp).
+#include <array>
 #include <string>
 #include <vector>
 
 #include "plumbline/exports/export.hpp"
+#include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/viewer/scene.hpp"
 
 namespace plumbline::exports {
@@ -16,6 +18,9 @@ inline constexpr const char* kViewGenerator = "plumbline view";
 struct MapView {
   viewer::Scene scene;
   std::vector<std::string> notes;  ///< whole sentences on missing parts of the scene, with reasons
+  /// From the own frames of the map, or the two, into that of the scene.
+  std::array<geometry::Rigid3, 2> world_from_map = {};
+  geometry::Rigid3 first_from_second;  ///< of two: from the frame of the second one's results
 };
 
 /// All that the map has to show: cloud with its layers, paths, keyframes with small pictures where the

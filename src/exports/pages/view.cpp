@@ -359,6 +359,8 @@ core::Result<MapView> view_of_two(const ExportRequest& first, const ExportReques
   const auto placed = place_second(*one, scene.clouds.front(), *other, added->second);
   if (!placed) return tl::unexpected(placed.error());
   move(added->second, placed->first_from_second);
+  view->first_from_second = placed->first_from_second;
+  view->world_from_map = {one->world_from_map(), placed->first_from_second * other->world_from_map()};
   scene.placing = placed->how;
   view->notes.push_back(placed->how);
 

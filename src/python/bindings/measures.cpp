@@ -6,6 +6,7 @@
 #include "background.hpp"
 #include "bindings.hpp"
 #include "option_values.hpp"
+#include "plumbline/changes/compare.hpp"
 #include "plumbline/dataset/image_io.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/evaluate/cloud.hpp"
@@ -117,6 +118,21 @@ py::tuple write_export(const fs::path& input, const fs::path& output, const std:
   return py::make_tuple(summary.written, summary.notes);
 }
 
+/// Writes a comparison of two maps.
+void compare(const fs::path& before, const fs::path& after, const fs::path& output, bool given_order,
+             const OptionValues& values, bool replace, int threads) {
+  changes::CompareRequest request;
+  request.before = before;
+  request.after = after;
+  request.output = output;
+  request.replace = replace;
+  request.order = given_order ? changes::Order::kGiven : changes::Order::kStamps;
+  set_options(request.options, values, "compare");
+  const py::gil_scoped_release free;
+  QueueLog log;
+  value_of(changes::compare_maps(request, core::Executor(threads), log, nullptr));
+}
+
 /// A result's cloud, paths and, if wanted, lines; `frame`: theirs.
 viz::Scene scene_of(const fs::path& input, bool lines, cloud::CloudFrame& frame) {
   viz::Scene scene;
@@ -168,6 +184,8 @@ void add_measures(py::module_& module) {
   module.def("write_export", &write_export, py::arg("input"), py::arg("output"), py::arg("format"),
              py::arg("what"), py::arg("options"), py::arg("pipelines"), py::arg("replace"),
              py::arg("threads"));
+  module.def("compare", &compare, py::arg("before"), py::arg("after"), py::arg("output"), py::arg("given_order"),
+             py::arg("options"), py::arg("replace"), py::arg("threads"));
   module.def("render", &render, py::arg("input"), py::arg("title"), py::arg("lines"), py::arg("options"),
              py::arg("picture"));
 }

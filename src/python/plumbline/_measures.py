@@ -2,8 +2,11 @@
 """Numbers, exports and pictures of results."""
 from __future__ import annotations
 
+import csv
+import functools
 import json
 import os
+from io import open as open_text
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Dict, List, Optional, Tuple, Union
@@ -55,6 +58,49 @@ def evaluate_trajectory(
     report = Report(json.loads(text))
     report.stamps, report.errors = stamps, errors
     return report
+
+
+class Changes:
+    """What has changed between two maps: the folder that `compare` has written.
+
+    changes  rows of changes.csv: numbers where they are numbers; None: empty
+    """
+
+    def __init__(self, folder: PathLike) -> None:
+        self.folder = Path(path_of(folder, "folder"))
+        self.summary: Dict[str, Any] = dict(json.loads(_core.read_json(self.folder / "summary.json")))
+        with open_text(self.folder / "changes.csv", encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file))
+        self.changes: List[Dict[str, Any]] = [
+            {key: text if key == "kind" else float(text) if text else None for key, text in row.items()} for row in rows
+        ]
+
+    @functools.cached_property
+    def cloud(self) -> Cloud:
+        """The places that were compared, with columns kind, distance, limit and so on."""
+        return Cloud.read(self.folder / "changes.ply")
+
+    def __repr__(self) -> str:
+        return f"<plumbline.Changes {self.folder}: {len(self.changes)}>"
+
+
+def compare(
+    before: MapLike, after: MapLike, output: PathLike, *, order: str = "stamps", threads: int = 0, force: bool = False,
+    **options: Any,
+) -> Changes:
+    """Tells what has changed between two maps of one place: `plumbline compare` as a call.
+
+    order    "stamps" or "given": which map is the later one
+    options  spacing, depth, min_size ... as plumbline compare --help lists them
+
+    Raises UntrustworthyError (they do not fit together), InputError, ConfigError, OutputError.
+    """
+    if order not in ("stamps", "given"):
+        raise _core.ConfigError(f"order: '{order}' (allowed: stamps, given)")
+    _core.compare(
+        _path(before), _path(after), path_of(output, "output"), order == "given", option_texts(options), force, threads
+    )
+    return Changes(output)
 
 
 def evaluate_cloud(
