@@ -38,9 +38,9 @@ constexpr const char* kExportsFrame = R"(
 
 *The grid of a generated office that two robots filmed in part: black is occupied, white is free, grey was not seen.*
 
-![Plan of a generated office](pictures/plan.png)
+![Plan of a generated home](pictures/plan.png)
 
-*The plan of the same map: walls that were seen up to where furniture ends, with three doors (red) and the paths.*
+*A plan on its sheet ([plans.md](plans.md)).*
 
 For a map of 1.5 million points (a generated office, 181 keyframes, 826 views) on two cores:
 

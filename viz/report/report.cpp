@@ -73,21 +73,24 @@ core::Result<ReportSummary> write_report(const ReportRequest& request, const cor
   auto viewer = viewer_html(*data, request, executor, log);
   if (!viewer) return tl::unexpected<core::Error>(viewer.error());
 
+  const auto head = head_html(*data, request);
+  if (!head) return tl::unexpected<core::Error>(head.error());
   const std::string page = page_html(
-      "Plumbline report: " + data->name, head_html(*data),
+      "Plumbline report: " + (request.title.empty() ? data->name : request.title), *head,
       {{"map", "The map to walk through", std::move(*viewer)},
        {"pictures", "Pictures", std::move(*pictures)},
-       {"path", "The path", path_html(*data)},
        {"exports", "Exports", exports_html(*data)},
-       {"tracking", "Tracking over time", tracking_html(*data)},
-       {"loops", "Loops", loops_html(*data)},
-       {"merges", merges_title(*data), merges_html(*data)},
-       {"refinement", "Refinement of the whole", refinement_html(*data)},
-       {"cloud", "The cloud", cloud_html(*data)},
        {"accuracy", "Accuracy", accuracy_html(*data)},
-       {"cost", "Time and memory", cost_html(*data)},
-       {"configuration", "Configuration", configuration_html(*data)},
-       {"files", "Files", files_html(*data, file)}},
+       {"run", "The run", run_html(*data), true},
+       {"path", "The path", path_html(*data), true},
+       {"tracking", "Tracking over time", tracking_html(*data), true},
+       {"loops", "Loops", loops_html(*data), true},
+       {"merges", merges_title(*data), merges_html(*data), true},
+       {"refinement", "Refinement of the whole", refinement_html(*data), true},
+       {"cloud", "The cloud", cloud_html(*data), true},
+       {"cost", "Time and memory", cost_html(*data), true},
+       {"configuration", "Configuration", configuration_html(*data), true},
+       {"files", "Files", files_html(*data, file), true}},
       fmt::format("Written by plumbline {} from the result folder {}.", core::version(), data->name));
 
   if (auto written = core::write_file(file, page); !written)

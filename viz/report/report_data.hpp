@@ -78,6 +78,7 @@ struct ReportData {
   std::optional<CloudExtent> extent;            ///< none without finite points
   std::string cloud_file;                       ///< its name
   std::vector<std::string> missing;             ///< one line each
+  std::string plan_html;                        ///< floor plan and its tables; empty: none was found
   std::string truth;                            ///< the file or files that the paths are compared with
   std::optional<evaluate::Statistics> joint_m;  ///< ATE of all robots, one alignment for all
 };

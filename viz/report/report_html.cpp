@@ -123,13 +123,15 @@ std::string folded(const std::string& title, const std::string& html, bool open)
 
 std::string page_html(const std::string& title, const std::string& head_html,
                       const std::vector<Section>& sections, const std::string& foot) {
-  std::string contents, body;
+  std::string contents, body, behind;
   for (const Section& section : sections) {
     if (section.html.empty()) continue;
     contents += fmt::format("<a href=\"#{}\">{}</a>", section.id, markup_text(section.title));
-    body += fmt::format("<section id=\"{}\"><h2>{}</h2>\n{}</section>\n", section.id,
-                        markup_text(section.title), section.html);
+    (section.behind ? behind : body) += fmt::format("<section id=\"{}\"><h2>{}</h2>\n{}</section>\n",
+                                                    section.id, markup_text(section.title), section.html);
   }
+  if (!behind.empty())
+    body += "<details class=\"made\"><summary>How it was made</summary>\n" + behind + "</details>\n";
   return fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/>\n"
       "<meta name=\"generator\" content=\"{}\"/>\n"

@@ -66,7 +66,8 @@ std::string folded(const std::string& title, const std::string& html, bool open 
 struct Section {
   std::string id;
   std::string title;
-  std::string html;  ///< empty: the part is left out
+  std::string html;     ///< empty: the part is left out
+  bool behind = false;  ///< of how the result was made: folded, behind all others
 };
 
 /// Text by which a file is recognised as a report.

@@ -10,8 +10,10 @@
 
 namespace plumbline::report {
 
-/// Verdict, key figures, doubts about the result, input and settings.
-std::string head_html(const ReportData& data);
+/// The first page: what it is of, whether to trust it, plan, rooms and openings. Errors (kInput): the logo.
+core::Result<std::string> head_html(const ReportData& data, const ReportRequest& request);
+/// Key figures, gaps, input and settings.
+std::string run_html(const ReportData& data);
 /// The folder's snapshots; if it has none, they are drawn now. `scratch`: folder for temporary pictures.
 core::Result<std::string> pictures_html(ReportData& data, const std::filesystem::path& scratch);
 /// The map to turn and walk through; empty without a cloud. If it cannot be shown, `data` says so. Errors

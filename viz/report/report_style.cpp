@@ -46,6 +46,10 @@ tr.bad td{background:none}tr.bad td:nth-child(2){color:var(--bad);font-weight:60
 .facts th{color:var(--muted);font-weight:400;padding-right:1.6em;white-space:nowrap}
 figure{margin:0}
 figure>img{display:block;max-width:100%;height:auto}
+.plan{margin:1.2em 0}.plan img{width:100%;background:#fff;border:1px solid var(--rule);border-radius:6px}
+.half{display:inline-block;vertical-align:top;margin-right:3em}.half h3{margin-top:.4em}
+.logo{float:right;max-width:180px;max-height:70px}
+.made>summary{font-size:1.3em;font-weight:600;padding:.6em 0;border-top:2px solid var(--rule);margin-top:1.6em}
 .plans figure{margin:0 0 1.2em}
 .plans img{margin:0 auto;background:#fff;border:1px solid var(--rule);border-radius:6px}
 .pictures{display:grid;grid-template-columns:repeat(2,1fr);gap:1em}
@@ -58,7 +62,8 @@ font:12.5px/1.45 ui-monospace,"DejaVu Sans Mono",Menlo,Consolas,monospace}
 footer{margin-top:3em;color:var(--muted);font-size:.85em;border-top:1px solid var(--rule);padding-top:.8em}
 @media(max-width:640px){.facts th{white-space:normal}.pictures{grid-template-columns:1fr}main{padding:1.2em .8em}}
 @page{margin:14mm}
-@media print{.screen,section:has(>.pv):not(:has(>.pv-paper)){display:none}.plans img{max-height:225mm}
+@media print{.screen,section:has(>.pv):not(:has(>.pv-paper)){display:none}.plans img{max-height:225mm}.plan img{max-height:125mm;object-fit:contain}
+header{break-after:page}
 body{font-size:10.5pt}main{max-width:none;padding:0}nav{display:none}section{margin-top:1.4em}
 *{-webkit-print-color-adjust:exact;print-color-adjust:exact}h2,h3{break-after:avoid}
 figure,tr,.tiles,.verdict{break-inside:avoid}thead{display:table-header-group}.scroll{overflow:visible}

@@ -36,6 +36,12 @@ struct ExportOptions {
   // Plans.
   double cut_m = 1.2;           ///< height over the floor
   std::vector<double> section;  ///< x y x y: a vertical cut along this line instead; empty: a plan
+  std::string paper = "auto";   ///< "A4" to "A0"
+  std::string scale = "auto";   ///< "1:50"
+  std::string title, client, address, date;  ///< of the title block
+  std::string title_block;                   ///< a YAML file with them and others
+  std::string decimal = "point";             ///< or "comma"
+  std::string without = "path";              ///< layers that are left out, separated by commas
   // Paths.
   /// Pose x y z qx qy qz qw of the camera in the body; empty: the camera's own path.
   std::vector<double> body;

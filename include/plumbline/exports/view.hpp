@@ -15,8 +15,20 @@ namespace plumbline::exports {
 /// Mark by which a page that holds only the viewer is recognised.
 inline constexpr const char* kViewGenerator = "plumbline view";
 
+/// A floor plan for a page.
+struct PlanPage {
+  struct Table {
+    std::string title;
+    std::vector<std::string> columns;
+    std::vector<std::vector<std::string>> rows;
+  };
+  std::string svg;            ///< in a round scale, at most as wide as A4; empty: no plan was found
+  std::vector<Table> tables;  ///< rooms, openings
+};
+
 struct MapView {
   viewer::Scene scene;
+  PlanPage plan;
   std::vector<std::string> notes;  ///< whole sentences on missing parts of the scene, with reasons
   /// From the own frames of the map, or the two, into that of the scene.
   std::array<geometry::Rigid3, 2> world_from_map = {};

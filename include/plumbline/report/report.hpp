@@ -19,7 +19,10 @@ struct ReportRequest {
   std::filesystem::path truth;   ///< empty: none. A recording, a folder of recordings by robot, or a TUM file
   std::filesystem::path other;   ///< a second result, shown over the map to walk through; empty: none
   std::size_t points = 1500000;  ///< of the map to walk through, at most, thinned by voxels; 0: all
-  bool replace = false;          ///< an earlier report, and nothing else, may be replaced
+  std::string title;             ///< of the page; empty: the folder's name
+  std::string client, address, date;  ///< for the first page; empty: left out
+  std::filesystem::path logo;         ///< PNG, JPEG or SVG for the first page; empty: none
+  bool replace = false;               ///< an earlier report, and nothing else, may be replaced
 };
 
 struct ReportSummary {

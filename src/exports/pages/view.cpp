@@ -19,7 +19,7 @@
 #include "pages/seen_from.hpp"
 #include "pages/thumbnails.hpp"
 #include "paths/lines.hpp"
-#include "plans/walls.hpp"
+#include "plans/plan_sheets.hpp"
 #include "plumbline/cloud/columns.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/maps/pose_samples.hpp"
@@ -251,14 +251,17 @@ void add_plan(MapSource& source, MapView& view) {
     scene.walls.emplace_back(at(wall.at(from)), at(wall.at(wall.s1)));
   }
 
-  for (const WallDoor& door : plan->doors)
+  for (const WallDoor& door : plan->doors) {
+    if (door.kind == OpeningKind::kWindow) continue;
     scene.doors.emplace_back(at(0.5 * (door.jambs[0] + door.far_jambs[0])),
                              at(0.5 * (door.jambs[1] + door.far_jambs[1])));
+  }
 
   for (const WallRoom& room : plan->rooms)
     scene.rooms.emplace_back(at(room.label),
                              fmt::format("{}{:.2f} m²", room.closed ? "" : "≥ ", room.area_m2));
   scene.plan_height_m = height;
+  view.plan = plan_page(*plan, scene.name);
 }
 
 /// The cloud with so many points as are wanted, for the page and as it is.

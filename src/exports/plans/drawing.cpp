@@ -3,10 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdlib>
 
 #include "plumbline/core/output_file.hpp"
 
@@ -40,88 +37,62 @@ std::string svg_path(const DrawnLine& line, const DrawingSheet& sheet) {
 
 }  // namespace
 
-std::pair<Eigen::Vector2d, Eigen::Vector2d> Drawing::bounds() const {
-  Eigen::Vector2d low = Eigen::Vector2d::Constant(1e300);
-  Eigen::Vector2d high = -low;
-  const auto add = [&](const Eigen::Vector2d& p) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  };
-  for (const DrawnLine& line : lines) {
-    for (const Eigen::Vector2d& p : line.points) add(p);
-  }
-  for (const DrawnText& text : texts) {
-    const double reach = 0.35 * text.height_m * static_cast<double>(text.text.size());
-    add(text.at - Eigen::Vector2d(reach, text.height_m));
-    add(text.at + Eigen::Vector2d(reach, text.height_m));
-  }
-  if (lines.empty() && texts.empty()) return {Eigen::Vector2d::Zero(), Eigen::Vector2d::Ones()};
-  return {low, high};
-}
+std::string svg_text(const Drawing& drawing) {
+  const DrawingSheet& sheet = drawing.sheet;
+  std::string out = fmt::format(
+      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" "
+      "width=\"{0:.2f}mm\" height=\"{1:.2f}mm\" viewBox=\"0 0 {0:.2f} {1:.2f}\">\n"
+      "<title>{2}</title>\n<desc>scale 1:{3}; {4:.6f} {5:.6f} (m) is at the lower left",
+      sheet.width_mm, sheet.height_mm, escaped(drawing.title), sheet.scale, sheet.low.x(), sheet.low.y());
+  for (const std::string& note : drawing.notes) out += "; " + escaped(note);
+  out += "</desc>\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n";
 
-DrawingSheet sheet_of(const Drawing& drawing) {
-  constexpr std::array<int, 8> kScales{20, 50, 100, 200, 500, 1000, 2000, 5000};
-  constexpr double kLongest_mm = 841.0;  // A1
-  const auto [low, high] = drawing.bounds();
-  DrawingSheet sheet;
-  sheet.low = low;
-  for (const int scale : kScales) {
-    sheet.scale = scale;
-    sheet.per_metre_mm = 1000.0 / scale;
-    sheet.width_mm = sheet.per_metre_mm * (high.x() - low.x()) + 2.0 * sheet.margin_mm;
-    sheet.height_mm = sheet.per_metre_mm * (high.y() - low.y()) + 2.0 * sheet.margin_mm;
-    if (std::max(sheet.width_mm, sheet.height_mm) <= kLongest_mm) break;
+  const std::vector<DrawnLine> lines = drawing.all_lines();
+  const std::vector<DrawnText> texts = drawing.all_texts();
+  for (std::size_t layer = 0; layer < drawing.layers.size(); ++layer) {
+    const DrawingLayer& l = drawing.layers[layer];
+    out += fmt::format(
+        "<g id=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{:g}\" stroke-linecap=\"round\" "
+        "stroke-linejoin=\"round\">\n",
+        l.name, l.color, l.width_mm);
+
+    for (const DrawnLine& line : lines) {
+      if (line.layer != layer) continue;
+      out += fmt::format("<path d=\"{}\"{}{}/>\n", svg_path(line, sheet),
+                         line.filled ? fmt::format(" fill=\"{}\" stroke=\"none\"", l.color) : "",
+                         line.dashed ? " stroke-dasharray=\"2 1.2\"" : "");
+    }
+
+    for (const DrawnText& text : texts) {
+      if (text.layer != layer) continue;
+      const Eigen::Vector2d at = sheet.on_paper(text.at);
+      const double height_mm = text.height_m / sheet.mm(), width_mm = text.width_m() / sheet.mm();
+      out += fmt::format(
+          "<text transform=\"translate({:.3f} {:.3f}) rotate({:.2f})\" x=\"{:.3f}\" y=\"{:.3f}\" "
+          "font-family=\"Helvetica, Arial, sans-serif\" font-size=\"{:.3f}\" textLength=\"{:.3f}\" "
+          "lengthAdjust=\"spacingAndGlyphs\" fill=\"{}\" stroke=\"none\">{}</text>\n",
+          at.x(), at.y(), -readable_angle(text.angle_rad) * 180.0 / M_PI, -0.5 * width_mm, 0.5 * height_mm,
+          height_mm / 0.718, width_mm, l.color, escaped(text.text));
+    }
+
+    out += "</g>\n";
   }
-  return sheet;
+  return out + "</svg>\n";
 }
 
 core::Result<void> write_svg(const std::filesystem::path& file, const Drawing& drawing) {
-  const DrawingSheet sheet = sheet_of(drawing);
-  core::OutputFile out(file);
-  out.write(fmt::format(
-      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" "
-      "width=\"{0:.2f}mm\" height=\"{1:.2f}mm\" viewBox=\"0 0 {0:.2f} {1:.2f}\">\n"
-      "<title>{2}</title>\n<desc>scale 1:{3}; {4:.6g} {5:.6g} (m) is at the lower left, {6:g} mm in",
-      sheet.width_mm, sheet.height_mm, escaped(drawing.title), sheet.scale, sheet.low.x(), sheet.low.y(),
-      sheet.margin_mm));
-
-  for (const std::string& note : drawing.notes) out.write("; " + escaped(note));
-  out.write("</desc>\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n");
-  for (std::size_t layer = 0; layer < drawing.layers.size(); ++layer) {
-    const DrawingLayer& l = drawing.layers[layer];
-    out.write(
-        fmt::format("<g id=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{:g}\" stroke-linecap=\"round\" "
-                    "stroke-linejoin=\"round\">\n",
-                    l.name, l.color, l.width_mm));
-
-    for (const DrawnLine& line : drawing.lines) {
-      if (line.layer != layer) continue;
-      out.write(fmt::format("<path d=\"{}\"{}/>\n", svg_path(line, sheet),
-                            line.filled ? fmt::format(" fill=\"{}\" stroke=\"none\"", l.color) : ""));
-    }
-
-    for (const DrawnText& text : drawing.texts) {
-      if (text.layer != layer) continue;
-      const Eigen::Vector2d at = sheet.on_paper(text.at);
-      out.write(fmt::format(
-          "<text transform=\"translate({:.3f} {:.3f}) rotate({:.2f})\" font-family=\"sans-serif\" "
-          "font-size=\"{:.2f}\" text-anchor=\"middle\" dy=\"0.35em\" fill=\"{}\" "
-          "stroke=\"none\">{}</text>\n",
-          at.x(), at.y(), -readable_angle(text.angle_rad) * 180.0 / M_PI,
-          1.4 * sheet.per_metre_mm * text.height_m, l.color, escaped(text.text)));
-    }
-
-    out.write("</g>\n");
-  }
-
-  out.write("</svg>\n");
-  return out.commit();
+  return core::write_file(file, svg_text(drawing));
 }
 
-core::Result<void> write_pdf(const std::filesystem::path& file, const Drawing& drawing) {
+core::Result<void> write_pdf(const std::filesystem::path& file, const std::vector<Drawing>& pages) {
   const auto& pdf = core::part<PdfFunctions>();
   if (!pdf) return tl::unexpected(pdf.error());
-  const auto bytes = (*pdf)->make(drawing, sheet_of(drawing));
+  std::vector<PdfFunctions::Page> parts;
+  for (const Drawing& page : pages) {
+    parts.push_back({&page, page.all_lines(), page.all_texts(), {}});
+    for (const DrawnText& text : parts.back().texts) parts.back().widths_m.push_back(text.width_m());
+  }
+  const auto bytes = (*pdf)->make(parts);
   if (!bytes) return tl::unexpected(bytes.error());
   return core::write_file(file, *bytes);
 }

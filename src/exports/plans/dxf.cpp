@@ -1,418 +1,291 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// DXF R2000 (AC1015): the smallest file that CAD programs open without mending. Lengths are metres.
-#include <fmt/format.h>
-
+// DXF R2000 (AC1015): a file that CAD programs open without mending. Lengths are metres.
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "plans/drawing.hpp"
+#include "plans/dxf_text.hpp"
 #include "plumbline/core/output_file.hpp"
 
 namespace plumbline::exports {
 namespace {
 
-/// Pairs of group code and value.
-class DxfText {
- public:
-  void put(int code, const std::string& value) { text_ += fmt::format("{:>3}\n{}\n", code, value); }
-  void put(int code, const char* value) { put(code, std::string(value)); }
-  void put(int code, int value) { put(code, std::to_string(value)); }
-  void put(int code, double value) { put(code, fmt::format("{:.6f}", value)); }
-  void point(int code, const Eigen::Vector2d& p) {
-    put(code, p.x());
-    put(code + 10, p.y());
-    put(code + 20, 0.0);
-  }
-  /// A new handle, which is put.
-  std::string handle() {
-    std::string name = fmt::format("{:X}", next_++);
-    put(5, name);
-    return name;
-  }
-  [[nodiscard]] std::string next_handle() const { return fmt::format("{:X}", next_); }
-  [[nodiscard]] const std::string& text() const { return text_; }
-
- private:
-  std::string text_;
-  int next_ = 0x100;
-};
-
-constexpr const char* kDxfModelBlock = "1F";  // handles that others point to
-constexpr const char* kDxfPaperBlock = "1B";
-constexpr const char* kDxfRootDictionary = "C";
-constexpr const char* kDxfBlocksTable = "1";
-
-void begin_table(DxfText& dxf, const char* name, const char* handle, int entries) {
-  dxf.put(0, "TABLE");
-  dxf.put(2, name);
-  dxf.put(5, handle);
-  dxf.put(330, "0");
-  dxf.put(100, "AcDbSymbolTable");
-  dxf.put(70, entries);
-}
-
-/// The common part of a table's entry.
-void begin_entry(DxfText& dxf, const char* type, const char* handle, const char* table, const char* marker,
-                 const std::string& name) {
-  dxf.put(0, type);
-  if (handle != nullptr) {
-    dxf.put(std::string(type) == "DIMSTYLE" ? 105 : 5, handle);
-  } else {
-    dxf.handle();
-  }
-  dxf.put(330, table);
-  dxf.put(100, "AcDbSymbolTableRecord");
-  dxf.put(100, marker);
-  dxf.put(2, name);
-}
-
-void put_viewport(DxfText& dxf, const Eigen::Vector2d& middle, double height) {
-  begin_table(dxf, "VPORT", "8", 1);
-  begin_entry(dxf, "VPORT", nullptr, "8", "AcDbViewportTableRecord", "*ACTIVE");
-  dxf.put(70, 0);
-  const auto pair = [&](int code, double x, double y) {
-    dxf.put(code, x);
-    dxf.put(code + 10, y);
-  };
-
-  pair(10, 0.0, 0.0);
-  pair(11, 1.0, 1.0);
-  pair(12, middle.x(), middle.y());
-  pair(13, 0.0, 0.0);
-  pair(14, 0.1, 0.1);
-  pair(15, 1.0, 1.0);
-
-  dxf.put(16, 0.0);
-  dxf.put(26, 0.0);
-  dxf.put(36, 1.0);
-  dxf.point(17, Eigen::Vector2d::Zero());
-  dxf.put(40, height);
-  dxf.put(41, 1.5);
-  dxf.put(42, 50.0);
-  dxf.put(0, "ENDTAB");
-}
-
-void put_line_types(DxfText& dxf) {
-  begin_table(dxf, "LTYPE", "5", 3);
-  for (const char* name : {"ByBlock", "ByLayer", "Continuous"}) {
+void put_line_types(DxfText& dxf, double mm) {
+  begin_table(dxf, "LTYPE", "5", 4);
+  for (const char* name : {"ByBlock", "ByLayer", "Continuous", "DASHED"}) {
+    const bool dashed = std::string(name) == "DASHED";
     begin_entry(dxf, "LTYPE", nullptr, "5", "AcDbLinetypeTableRecord", name);
     dxf.put(70, 0);
-    dxf.put(3, "");
+    dxf.put(3, dashed ? "__ __ __" : "");
     dxf.put(72, 65);
-    dxf.put(73, 0);
-    dxf.put(40, 0.0);
+    dxf.put(73, dashed ? 2 : 0);
+    dxf.put(40, dashed ? 3.2 * mm : 0.0);
+
+    for (const double part : {2.0 * mm, -1.2 * mm}) {
+      if (!dashed) continue;
+      dxf.put(49, part);
+      dxf.put(74, 0);
+    }
   }
   dxf.put(0, "ENDTAB");
+}
+
+/// The next of the widths that the form knows, hundredths of a millimetre.
+int line_weight(double width_mm) {
+  constexpr std::array<int, 12> kWeights{5, 9, 13, 15, 18, 20, 25, 30, 35, 40, 50, 70};
+  return *std::min_element(kWeights.begin(), kWeights.end(), [&](int a, int b) {
+    return std::abs(a - 100.0 * width_mm) < std::abs(b - 100.0 * width_mm);
+  });
 }
 
 void put_layers(DxfText& dxf, const Drawing& drawing) {
   begin_table(dxf, "LAYER", "2", static_cast<int>(drawing.layers.size()) + 1);
-  const auto put = [&](const std::string& name, int color) {
-    begin_entry(dxf, "LAYER", nullptr, "2", "AcDbLayerTableRecord", name);
+  const auto put = [&](const DrawingLayer& layer, int weight) {
+    begin_entry(dxf, "LAYER", nullptr, "2", "AcDbLayerTableRecord", layer.name);
     dxf.put(70, 0);
-    dxf.put(62, color);
+    dxf.put(62, layer.dxf_color);
     dxf.put(6, "Continuous");
-    dxf.put(370, -3);
+    dxf.put(370, weight);
     dxf.put(390, "F");
   };
-  put("0", 7);
-  for (const DrawingLayer& layer : drawing.layers) put(layer.name, layer.dxf_color);
+  put({"0"}, -3);
+  for (const DrawingLayer& layer : drawing.layers) put(layer, line_weight(layer.width_mm));
   dxf.put(0, "ENDTAB");
 }
 
-void put_small_tables(DxfText& dxf) {
-  begin_table(dxf, "STYLE", "3", 1);
-  begin_entry(dxf, "STYLE", "11", "3", "AcDbTextStyleTableRecord", "Standard");
-  dxf.put(70, 0);
-  dxf.put(40, 0.0);
-  dxf.put(41, 1.0);
+/// Height of the texts of dimensions, metres.
+double dimension_text(const Drawing& drawing) {
+  return drawing.dimensions.empty() ? 2.0 * drawing.sheet.mm() : drawing.dimensions.front().label.height_m;
+}
 
-  dxf.put(50, 0.0);
-  dxf.put(71, 0);
-  dxf.put(42, 0.2);
-  dxf.put(3, "txt");
-  dxf.put(4, "");
-  dxf.put(0, "ENDTAB");
-  begin_table(dxf, "VIEW", "6", 0);
-
-  dxf.put(0, "ENDTAB");
-  begin_table(dxf, "UCS", "7", 0);
-  dxf.put(0, "ENDTAB");
-  begin_table(dxf, "APPID", "9", 1);
-  begin_entry(dxf, "APPID", "12", "9", "AcDbRegAppTableRecord", "ACAD");
-  dxf.put(70, 0);
-  dxf.put(0, "ENDTAB");
-
-  begin_table(dxf, "DIMSTYLE", "A", 1);
+/// A style of dimensions whose measures are lengths on the ground.
+void put_dimension_styles(DxfText& dxf, const Drawing& drawing) {
+  const double text_m = dimension_text(drawing);
+  begin_table(dxf, "DIMSTYLE", "A", 2);
   dxf.put(100, "AcDbDimStyleTable");
-  begin_entry(dxf, "DIMSTYLE", "27", "A", "AcDbDimStyleTableRecord", "Standard");
-  dxf.put(70, 0);
-  dxf.put(340, "11");
-  dxf.put(0, "ENDTAB");
-
-  begin_table(dxf, "BLOCK_RECORD", kDxfBlocksTable, 2);
-  begin_entry(dxf, "BLOCK_RECORD", kDxfModelBlock, kDxfBlocksTable, "AcDbBlockTableRecord", "*Model_Space");
-  dxf.put(340, "22");
-  begin_entry(dxf, "BLOCK_RECORD", kDxfPaperBlock, kDxfBlocksTable, "AcDbBlockTableRecord", "*Paper_Space");
-  dxf.put(340, "1E");
-  dxf.put(0, "ENDTAB");
-}
-
-void put_blocks(DxfText& dxf) {
-  dxf.put(0, "SECTION");
-  dxf.put(2, "BLOCKS");
-
-  for (const bool model : {true, false}) {
-    const char* record = model ? kDxfModelBlock : kDxfPaperBlock;
-    const char* name = model ? "*Model_Space" : "*Paper_Space";
-    const auto begin = [&](const char* type) {
-      dxf.put(0, type);
-      dxf.handle();
-      dxf.put(330, record);
-      dxf.put(100, "AcDbEntity");
-      if (!model) dxf.put(67, 1);
-      dxf.put(8, "0");
-    };
-
-    begin("BLOCK");
-    dxf.put(100, "AcDbBlockBegin");
-    dxf.put(2, name);
+  for (const auto& [name, handle] : {std::pair("Standard", "27"), std::pair("PLAN", "28")}) {
+    begin_entry(dxf, "DIMSTYLE", handle, "A", "AcDbDimStyleTableRecord", name);
     dxf.put(70, 0);
-    dxf.point(10, Eigen::Vector2d::Zero());
-    dxf.put(3, name);
-    dxf.put(1, "");
-    begin("ENDBLK");
-    dxf.put(100, "AcDbBlockEnd");
-  }
+    for (const auto& [code, height] : {std::pair(41, 0.7), std::pair(42, 0.5), std::pair(44, 0.5),
+                                       std::pair(140, 1.0), std::pair(142, 0.4)})
+      dxf.put(code, height * text_m);
 
-  dxf.put(0, "ENDSEC");
+    dxf.put(144, 1.0 / drawing.unit);
+    dxf.put(147, 0.4 * text_m);
+    dxf.put(77, 1);
+    dxf.put(271, 3);
+    dxf.put(277, 2);
+    dxf.put(278, static_cast<int>(drawing.comma ? ',' : '.'));
+    dxf.put(340, "11");
+  }
+  dxf.put(0, "ENDTAB");
 }
 
-void begin_entity(DxfText& dxf, const char* type, const DrawingLayer& layer) {
+/// A block of the file: its record and its contents, whose owner the record is.
+struct DxfBlock {
+  std::string name, record;
+  std::vector<DrawnLine> lines;
+  std::vector<DrawnText> texts;
+};
+
+/// Model and paper, then symbols, then the pictures of dimensions.
+std::vector<DxfBlock> dxf_blocks(const Drawing& drawing) {
+  std::vector<DxfBlock> blocks{{"*Model_Space", kDxfModelBlock, {}, {}},
+                               {"*Paper_Space", kDxfPaperBlock, {}, {}}};
+  const auto record = [&] { return fmt::format("{:X}", 0x100 + blocks.size()); };
+  for (const DrawnBlock& block : drawing.blocks) blocks.push_back({block.name, record(), block.lines, {}});
+  for (std::size_t i = 0; i < drawing.dimensions.size(); ++i)
+    blocks.push_back({fmt::format("*D{}", i + 1),
+                      record(),
+                      lines_of(drawing.dimensions[i]),
+                      {drawing.dimensions[i].label}});
+  return blocks;
+}
+
+void put_block_records(DxfText& dxf, const std::vector<DxfBlock>& blocks) {
+  begin_table(dxf, "BLOCK_RECORD", kDxfBlocksTable, static_cast<int>(blocks.size()));
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    begin_entry(dxf, "BLOCK_RECORD", blocks[i].record.c_str(), kDxfBlocksTable, "AcDbBlockTableRecord",
+                blocks[i].name);
+    dxf.put(340, i == 0 ? "22" : i == 1 ? "1E" : "0");
+  }
+  dxf.put(0, "ENDTAB");
+}
+
+void begin_entity(DxfText& dxf, const char* type, const std::string& layer, const std::string& owner,
+                  bool dashed = false) {
   dxf.put(0, type);
   dxf.handle();
-  dxf.put(330, kDxfModelBlock);
+  dxf.put(330, owner);
   dxf.put(100, "AcDbEntity");
-  dxf.put(8, layer.name);
+  if (owner == kDxfPaperBlock) dxf.put(67, 1);
+  dxf.put(8, layer);
+  if (dashed) dxf.put(6, "DASHED");
 }
 
-void put_entities(DxfText& dxf, const Drawing& drawing, const Eigen::Matrix2d& turn,
-                  const Eigen::Vector2d& origin) {
+void put_line(DxfText& dxf, const DrawnLine& line, const std::string& layer, const std::string& owner) {
+  if (line.points.size() == 2 && !line.closed) {
+    begin_entity(dxf, "LINE", layer, owner, line.dashed);
+    dxf.put(100, "AcDbLine");
+    dxf.point(10, line.points[0]);
+    dxf.point(11, line.points[1]);
+    return;
+  }
+
+  begin_entity(dxf, "LWPOLYLINE", layer, owner, line.dashed);
+  dxf.put(100, "AcDbPolyline");
+  dxf.put(90, static_cast<int>(line.points.size()));
+  dxf.put(70, line.closed ? 1 : 0);
+  dxf.put(43, 0.0);
+  for (const Eigen::Vector2d& p : line.points) {
+    dxf.put(10, p.x());
+    dxf.put(20, p.y());
+  }
+}
+
+/// A text that is fitted between two places, so that it is as wide in every program.
+void put_text(DxfText& dxf, const DrawnText& text, const std::string& layer, const std::string& owner) {
+  const auto box = box_of(text);
+  begin_entity(dxf, "TEXT", layer, owner);
+  dxf.put(100, "AcDbText");
+  dxf.point(10, box[0]);
+  dxf.put(40, text.height_m);
+  dxf.put(1, text.text);
+  dxf.put(50, readable_angle(text.angle_rad) * 180.0 / M_PI);
+  dxf.put(72, 5);
+  dxf.point(11, box[1]);
+  dxf.put(100, "AcDbText");
+}
+
+void put_blocks(DxfText& dxf, const Drawing& drawing, const std::vector<DxfBlock>& blocks) {
+  dxf.put(0, "SECTION");
+  dxf.put(2, "BLOCKS");
+  for (const DxfBlock& block : blocks) {
+    begin_entity(dxf, "BLOCK", "0", block.record);
+    dxf.put(100, "AcDbBlockBegin");
+    dxf.put(2, block.name);
+    dxf.put(70, block.name.rfind("*D", 0) == 0 ? 1 : 0);
+    dxf.point(10, Eigen::Vector2d::Zero());
+    dxf.put(3, block.name);
+    dxf.put(1, "");
+
+    // Symbols take the layer on which they are set, as all on layer 0 does.
+    const bool symbol = block.name[0] != '*';
+    for (const DrawnLine& line : block.lines)
+      put_line(dxf, line, symbol ? "0" : drawing.layers[line.layer].name, block.record);
+    for (const DrawnText& text : block.texts)
+      put_text(dxf, text, drawing.layers[text.layer].name, block.record);
+    begin_entity(dxf, "ENDBLK", "0", block.record);
+    dxf.put(100, "AcDbBlockEnd");
+  }
+  dxf.put(0, "ENDSEC");
+}
+
+void put_area(DxfText& dxf, const DrawnArea& area, const std::string& layer) {
+  begin_entity(dxf, "HATCH", layer, kDxfModelBlock);
+  dxf.put(100, "AcDbHatch");
+  dxf.point(10, Eigen::Vector2d::Zero());
+  for (const auto& [code, value] : {std::pair(210, 0.0), std::pair(220, 0.0), std::pair(230, 1.0)})
+    dxf.put(code, value);
+  dxf.put(2, "ANSI31");
+  dxf.put(70, 0);
+  dxf.put(71, 0);
+  dxf.put(91, static_cast<int>(area.rings.size()));
+
+  for (std::size_t i = 0; i < area.rings.size(); ++i) {
+    dxf.put(92, i == 0 ? 3 : 2);
+    dxf.put(72, 0);
+    dxf.put(73, 1);
+    dxf.put(93, static_cast<int>(area.rings[i].size()));
+    for (const Eigen::Vector2d& p : area.rings[i]) {
+      dxf.put(10, p.x());
+      dxf.put(20, p.y());
+    }
+    dxf.put(97, 0);
+  }
+
+  dxf.put(75, 0);
+  dxf.put(76, 1);
+  dxf.put(52, 0.0);
+  dxf.put(41, area.spacing_m / 0.125);  // of the pattern's own lines
+  dxf.put(77, 0);
+  dxf.put(78, 1);
+
+  const double step = area.spacing_m / std::sqrt(2.0);
+  for (const auto& [code, value] : {std::pair(53, 45.0), std::pair(43, 0.0), std::pair(44, 0.0),
+                                    std::pair(45, -step), std::pair(46, step)})
+    dxf.put(code, value);
+  dxf.put(79, 0);
+  dxf.put(98, 0);
+}
+
+void put_symbol(DxfText& dxf, const DrawnSymbol& symbol, const std::string& block, const std::string& layer) {
+  const double turn = symbol.x.x() * symbol.y.y() - symbol.x.y() * symbol.y.x();
+  begin_entity(dxf, "INSERT", layer, kDxfModelBlock);
+  dxf.put(100, "AcDbBlockReference");
+  dxf.put(2, block);
+  dxf.point(10, symbol.at);
+  dxf.put(41, symbol.x.norm());
+  dxf.put(42, std::copysign(symbol.y.norm(), turn));
+  dxf.put(43, 1.0);
+  dxf.put(50, std::atan2(symbol.x.y(), symbol.x.x()) * 180.0 / M_PI);
+}
+
+void put_dimension(DxfText& dxf, const DrawnDimension& dimension, std::size_t number,
+                   const std::string& layer) {
+  begin_entity(dxf, "DIMENSION", layer, kDxfModelBlock);
+  dxf.put(100, "AcDbDimension");
+  dxf.put(2, fmt::format("*D{}", number));
+  dxf.point(10, dimension.to + dimension.beside);
+  dxf.point(11, dimension.label.at);
+  dxf.put(70, 1 + 32 + 128);  // aligned, its block is its own, its text was placed
+  dxf.put(1, dimension.label.text);
+  dxf.put(71, 5);
+  dxf.put(42, dimension.measure_m);
+  dxf.put(3, "PLAN");
+  dxf.put(100, "AcDbAlignedDimension");
+  dxf.point(13, dimension.from);
+  dxf.point(14, dimension.to);
+}
+
+void put_entities(DxfText& dxf, const Drawing& drawing) {
+  const auto layer = [&](const auto& thing) { return drawing.layers[thing.layer].name; };
   dxf.put(0, "SECTION");
   dxf.put(2, "ENTITIES");
-  const double turned_rad = std::atan2(turn(1, 0), turn(0, 0));
-  const double scale = turn.col(0).norm();
-
-  for (const DrawnLine& line : drawing.lines) {
-    const DrawingLayer& layer = drawing.layers[line.layer];
-    if (line.points.size() == 2 && !line.closed) {
-      begin_entity(dxf, "LINE", layer);
-      dxf.put(100, "AcDbLine");
-      dxf.point(10, origin + turn * line.points[0]);
-      dxf.point(11, origin + turn * line.points[1]);
-      continue;
-    }
-
-    begin_entity(dxf, "LWPOLYLINE", layer);
-    dxf.put(100, "AcDbPolyline");
-    dxf.put(90, static_cast<int>(line.points.size()));
-    dxf.put(70, line.closed ? 1 : 0);
-    dxf.put(43, 0.0);
-
-    for (const Eigen::Vector2d& p : line.points) {
-      const Eigen::Vector2d at = origin + turn * p;
-      dxf.put(10, at.x());
-      dxf.put(20, at.y());
-    }
-  }
-
-  for (const DrawnText& text : drawing.texts) {
-    const Eigen::Vector2d at = origin + turn * text.at;
-    begin_entity(dxf, "TEXT", drawing.layers[text.layer]);
-    dxf.put(100, "AcDbText");
-    dxf.point(10, at);
-
-    dxf.put(40, scale * text.height_m);
-    dxf.put(1, text.text);
-    dxf.put(50, readable_angle(text.angle_rad + turned_rad) * 180.0 / M_PI);
-    dxf.put(72, 1);
-    dxf.point(11, at);
-    dxf.put(100, "AcDbText");
-    dxf.put(73, 2);
-  }
-
+  for (const DrawnArea& area : drawing.areas) put_area(dxf, area, layer(area));
+  for (const DrawnLine& line : drawing.lines) put_line(dxf, line, layer(line), kDxfModelBlock);
+  for (const DrawnSymbol& symbol : drawing.symbols)
+    put_symbol(dxf, symbol, drawing.blocks[symbol.block].name, layer(symbol));
+  for (std::size_t i = 0; i < drawing.dimensions.size(); ++i)
+    put_dimension(dxf, drawing.dimensions[i], i + 1, layer(drawing.dimensions[i]));
+  for (const DrawnText& text : drawing.texts) put_text(dxf, text, layer(text), kDxfModelBlock);
   dxf.put(0, "ENDSEC");
-}
-
-void put_layout(DxfText& dxf, const char* handle, const char* name, int order, const char* block) {
-  dxf.put(0, "LAYOUT");
-  dxf.put(5, handle);
-  dxf.put(330, "1A");
-  dxf.put(100, "AcDbPlotSettings");
-  dxf.put(1, "");
-  dxf.put(2, "none_device");
-  dxf.put(4, "");
-  dxf.put(6, "");
-
-  for (int code = 40; code <= 49; ++code) dxf.put(code, 0.0);
-  dxf.put(140, 0.0);
-  dxf.put(141, 0.0);
-  dxf.put(142, 1.0);
-  dxf.put(143, 1.0);
-  dxf.put(70, order == 0 ? 1712 : 688);
-  dxf.put(72, 0);
-
-  dxf.put(73, 0);
-  dxf.put(74, 5);
-  dxf.put(7, "");
-  dxf.put(75, 16);
-  dxf.put(147, 1.0);
-  dxf.put(148, 0.0);
-  dxf.put(149, 0.0);
-
-  dxf.put(100, "AcDbLayout");
-  dxf.put(1, name);
-  dxf.put(70, 1);
-  dxf.put(71, order);
-  dxf.put(10, 0.0);
-  dxf.put(20, 0.0);
-  dxf.put(11, 12.0);
-
-  dxf.put(21, 9.0);
-  dxf.point(12, Eigen::Vector2d::Zero());
-  dxf.point(14, Eigen::Vector2d::Zero());
-  dxf.point(15, Eigen::Vector2d::Zero());
-  dxf.put(146, 0.0);
-  dxf.point(13, Eigen::Vector2d::Zero());
-  dxf.point(16, Eigen::Vector2d::UnitX());
-  dxf.point(17, Eigen::Vector2d::UnitY());
-  dxf.put(76, 0);
-  dxf.put(330, block);
-}
-
-void put_dictionary(DxfText& dxf, const char* handle, const char* owner,
-                    const std::vector<std::pair<const char*, const char*>>& entries) {
-  dxf.put(0, "DICTIONARY");
-  dxf.put(5, handle);
-  dxf.put(330, owner);
-  dxf.put(100, "AcDbDictionary");
-  dxf.put(281, 1);
-  for (const auto& [name, to] : entries) {
-    dxf.put(3, name);
-    dxf.put(350, to);
-  }
-}
-
-void put_objects(DxfText& dxf) {
-  dxf.put(0, "SECTION");
-  dxf.put(2, "OBJECTS");
-  put_dictionary(dxf, kDxfRootDictionary, "0",
-                 {{"ACAD_GROUP", "D"},
-                  {"ACAD_LAYOUT", "1A"},
-                  {"ACAD_MLINESTYLE", "17"},
-                  {"ACAD_PLOTSETTINGS", "19"},
-                  {"ACAD_PLOTSTYLENAME", "E"}});
-  put_dictionary(dxf, "D", kDxfRootDictionary, {});
-  put_dictionary(dxf, "1A", kDxfRootDictionary, {{"Model", "22"}, {"Layout1", "1E"}});
-
-  put_layout(dxf, "22", "Model", 0, kDxfModelBlock);
-  put_layout(dxf, "1E", "Layout1", 1, kDxfPaperBlock);
-  put_dictionary(dxf, "17", kDxfRootDictionary, {{"Standard", "18"}});
-  dxf.put(0, "MLINESTYLE");
-  dxf.put(5, "18");
-  dxf.put(330, "17");
-  dxf.put(100, "AcDbMlineStyle");
-
-  dxf.put(2, "Standard");
-  dxf.put(70, 0);
-  dxf.put(3, "");
-  dxf.put(62, 256);
-  dxf.put(51, 90.0);
-  dxf.put(52, 90.0);
-  dxf.put(71, 2);
-
-  for (const double offset : {0.5, -0.5}) {
-    dxf.put(49, offset);
-    dxf.put(62, 256);
-    dxf.put(6, "BYLAYER");
-  }
-
-  put_dictionary(dxf, "19", kDxfRootDictionary, {});
-  dxf.put(0, "ACDBDICTIONARYWDFLT");
-  dxf.put(5, "E");
-  dxf.put(330, kDxfRootDictionary);
-  dxf.put(100, "AcDbDictionary");
-  dxf.put(281, 1);
-  dxf.put(3, "Normal");
-
-  dxf.put(350, "F");
-  dxf.put(100, "AcDbDictionaryWithDefault");
-  dxf.put(340, "F");
-  dxf.put(0, "ACDBPLACEHOLDER");
-  dxf.put(5, "F");
-  dxf.put(330, "E");
-  dxf.put(0, "ENDSEC");
-}
-
-std::string dxf_header(const std::string& next_handle, const std::vector<std::string>& notes,
-                       const Eigen::Vector2d& low, const Eigen::Vector2d& high) {
-  DxfText dxf;
-  for (const std::string& note : notes) dxf.put(999, note);
-  dxf.put(0, "SECTION");
-  dxf.put(2, "HEADER");
-
-  const auto variable = [&](const char* name) { dxf.put(9, name); };
-  variable("$ACADVER");
-  dxf.put(1, "AC1015");
-  variable("$DWGCODEPAGE");
-  dxf.put(3, "ANSI_1252");
-  variable("$HANDSEED");
-
-  dxf.put(5, next_handle);
-  variable("$INSUNITS");
-  dxf.put(70, 6);  // metres
-  variable("$MEASUREMENT");
-  dxf.put(70, 1);
-  variable("$EXTMIN");
-  dxf.point(10, low);
-
-  variable("$EXTMAX");
-  dxf.point(10, high);
-  dxf.put(0, "ENDSEC");
-  dxf.put(0, "SECTION");
-  dxf.put(2, "CLASSES");
-  dxf.put(0, "ENDSEC");
-  return dxf.text();
 }
 
 }  // namespace
 
-core::Result<void> write_dxf(const std::filesystem::path& file, const Drawing& drawing,
-                             const Eigen::Matrix2d& turn, const Eigen::Vector2d& origin) {
-  Eigen::Vector2d low = Eigen::Vector2d::Constant(1e300);
-  Eigen::Vector2d high = -low;
-  for (const DrawnLine& line : drawing.lines) {
-    for (const Eigen::Vector2d& p : line.points) {
-      low = low.cwiseMin(origin + turn * p);
-      high = high.cwiseMax(origin + turn * p);
-    }
-  }
-
+core::Result<void> write_dxf(const std::filesystem::path& file, const Drawing& drawing) {
+  const auto [low, high] = drawing.bounds();
+  const std::vector<DxfBlock> blocks = dxf_blocks(drawing);
   DxfText dxf;
   dxf.put(0, "SECTION");
   dxf.put(2, "TABLES");
   put_viewport(dxf, 0.5 * (low + high), 1.1 * std::max(1.0, (high - low).maxCoeff()));
-  put_line_types(dxf);
-
+  put_line_types(dxf, drawing.sheet.mm());
   put_layers(dxf, drawing);
-  put_small_tables(dxf);
+  put_style_tables(dxf);
+  put_dimension_styles(dxf, drawing);
+  put_block_records(dxf, blocks);
   dxf.put(0, "ENDSEC");
-  put_blocks(dxf);
-  put_entities(dxf, drawing, turn, origin);
+
+  put_blocks(dxf, drawing, blocks);
+  put_entities(dxf, drawing);
   put_objects(dxf);
   dxf.put(0, "EOF");
 
   core::OutputFile out(file);
-  out.write(dxf_header(dxf.next_handle(), drawing.notes, low, high));
+  out.write(dxf_header(dxf.next_handle(), drawing.notes, low, high, dimension_text(drawing)));
   out.write(dxf.text());
   return out.commit();
 }

@@ -8,14 +8,13 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "plans/opening_points.hpp"
 #include "plans/room_cells.hpp"
 #include "plans/wall_steps.hpp"
 #include "plumbline/core/numbers.hpp"
 
 namespace plumbline::exports {
-namespace {
 
-/// The most frequent of places along a line, as the mean of those near it; nothing: too few.
 std::optional<double> main_place(const std::vector<double>& places) {
   constexpr double kBin_m = 0.002;
   constexpr double kNear_m = 0.008;
@@ -46,15 +45,7 @@ std::optional<double> main_place(const std::vector<double>& places) {
   return best;
 }
 
-/// Points near an opening, in its own axes: s along the wall from the first jamb, h in front of its face, z
-/// over the floor; normals likewise.
-struct NearPoints {
-  std::vector<Eigen::Vector3d> places;
-  std::vector<Eigen::Vector3d> normals;
-};
-
-NearPoints points_near(const cloud::Cloud& cloud, double floor_m, const WallDoor& door) {
-  constexpr double kReach_m = 0.35;
+NearPoints points_near(const cloud::Cloud& cloud, double floor_m, const WallDoor& door, double reach_m) {
   NearPoints points;
   const Eigen::Vector2d along = (door.jambs[1] - door.jambs[0]).normalized();
   const Eigen::Vector2d front(along.y(), -along.x());
@@ -62,7 +53,7 @@ NearPoints points_near(const cloud::Cloud& cloud, double floor_m, const WallDoor
   for (const cloud::Point& p : cloud) {
     const Eigen::Vector2d way = p.getVector3fMap().head<2>().cast<double>() - door.jambs[0];
     const double s = along.dot(way), h = front.dot(way);
-    if (s < -kReach_m || s > door.width_m + kReach_m || h > kReach_m || h < -depth - kReach_m) continue;
+    if (s < -reach_m || s > door.width_m + reach_m || h > reach_m || h < -depth - reach_m) continue;
     const Eigen::Vector3d normal = p.getNormalVector3fMap().cast<double>();
     points.places.emplace_back(s, h, static_cast<double>(p.z) - floor_m);
     points.normals.emplace_back(along.dot(normal.head<2>()), front.dot(normal.head<2>()), normal.z());
@@ -70,7 +61,6 @@ NearPoints points_near(const cloud::Cloud& cloud, double floor_m, const WallDoor
   return points;
 }
 
-/// Moves the jambs to where their faces were seen, which lie between the faces of the wall: leaves do not.
 void measure_jambs(const NearPoints& points, WallDoor& door) {
   constexpr double kReach_m = 0.3;
   constexpr double kInside_m = 0.008;
@@ -96,7 +86,10 @@ void measure_jambs(const NearPoints& points, WallDoor& door) {
     door.jamb_seen[k] = found.has_value();
     if (found) ends[k] = *found;
   }
-  const Eigen::Vector2d first = door.jambs[0], across = door.far_jambs[0] - door.jambs[0];
+
+  // Square to the wall, as the ends of its two faces need not lie opposite each other.
+  const Eigen::Vector2d first = door.jambs[0], front(along.y(), -along.x());
+  const Eigen::Vector2d across = front.dot(door.far_jambs[0] - first) * front;
 
   for (std::size_t k = 0; k < 2; ++k) {
     door.jambs[k] = first + ends[k] * along;
@@ -104,6 +97,8 @@ void measure_jambs(const NearPoints& points, WallDoor& door) {
   }
   door.width_m = ends[1] - ends[0];
 }
+
+namespace {
 
 /// The height of what faces down in the opening.
 void measure_head(const NearPoints& points, WallDoor& door) {

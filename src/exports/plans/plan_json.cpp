@@ -4,7 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "plans/walls.hpp"
+#include "plans/plan_drawing.hpp"
 #include "plumbline/core/json.hpp"
 
 namespace plumbline::exports {
@@ -48,17 +48,23 @@ std::string plan_json(const WallPlan& plan, const std::string& frame, double flo
     json["rooms"].push_back(room_json(plan.rooms[i], i + 1));
 
   json["openings"] = PlanJson::array();
-  for (const WallDoor& door : plan.doors) {
-    json["openings"].push_back({{"kind", door.kind == OpeningKind::kDoor      ? "door"
-                                         : door.kind == OpeningKind::kPassage ? "passage"
-                                                                              : "window"},
-                                {"jambs_m",
-                                 {place(0.5 * (door.jambs[0] + door.far_jambs[0])),
-                                  place(0.5 * (door.jambs[1] + door.far_jambs[1]))}},
-                                {"width_m", to_tenth_mm(door.width_m)},
-                                {"depth_m", known(door.depth_m())},
-                                {"sill_m", to_tenth_mm(door.sill_m)},
-                                {"head_m", known(door.head_m)}});
+  const std::vector<std::string> numbers = opening_numbers(plan);
+  for (std::size_t i = 0; i < plan.doors.size(); ++i) {
+    const WallDoor& door = plan.doors[i];
+    json["openings"].push_back(
+        {{"number", numbers[i]},
+         {"kind", door.kind == OpeningKind::kDoor      ? "door"
+                  : door.kind == OpeningKind::kPassage ? "passage"
+                                                       : "window"},
+         {"jambs_m",
+          {place(0.5 * (door.jambs[0] + door.far_jambs[0])),
+           place(0.5 * (door.jambs[1] + door.far_jambs[1]))}},
+         {"width_m", to_tenth_mm(door.width_m)},
+         {"depth_m", known(door.depth_m())},
+         {"sill_m", to_tenth_mm(door.sill_m)},
+         {"head_m", known(door.head_m)},
+         {"hinge", door.hinge < 0 ? PlanJson(nullptr) : PlanJson(door.hinge)},
+         {"opens", door.hinge < 0 ? PlanJson(nullptr) : PlanJson(door.opens_front ? "right" : "left")}});
   }
 
   json["walls"] = PlanJson::array();

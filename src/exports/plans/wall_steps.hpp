@@ -65,6 +65,14 @@ void find_far_sides(const std::vector<WallLine>& walls, std::vector<WallDoor>& d
 /// Openings between the free end of a wall and the wall that its line meets next, which are the rest of it.
 std::vector<WallDoor> doors_at_free_ends(const std::vector<WallLine>& walls,
                                          const std::vector<WallDoor>& doors);
+/// Hinges of doors whose leaves were seen.
+void find_leaves(const cloud::Cloud& cloud, double floor_m, const std::vector<WallLine>& walls,
+                 std::vector<WallDoor>& doors);
+/// Gaps at the cut whose edges were seen. The gaps of the walls become as wide as they are.
+std::vector<WallDoor> windows_of(const cloud::Cloud& cloud, double floor_m, double cut_m,
+                                 std::vector<WallLine>& walls);
+/// Ends the faces of walls at the jambs.
+void cut_walls_at(const std::vector<WallDoor>& openings, std::vector<WallLine>& walls);
 /// The line from the one jamb to the other, as a wall.
 WallLine closing_of(const WallDoor& door);
 

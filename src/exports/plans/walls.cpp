@@ -66,34 +66,6 @@ Eigen::AlignedBox2d box_of(const std::vector<WallLine>& walls) {
   return {box.min() - margin, box.max() + margin};
 }
 
-/// Moves what was found in a cloud less its shift to where it is.
-void move_plan(const Eigen::Vector2d& shift, WallPlan& plan) {
-  for (WallLine& wall : plan.walls) {
-    const double along_m = wall.along().dot(shift);
-    wall.offset_m += wall.normal.dot(shift);
-    wall.s0 += along_m;
-    wall.s1 += along_m;
-
-    for (auto* parts : {&wall.openings, &wall.gaps}) {
-      for (WallOpening& part : *parts) part = {part.s0 + along_m, part.s1 + along_m};
-    }
-  }
-
-  for (WallDoor& door : plan.doors) {
-    for (Eigen::Vector2d& jamb : door.jambs) jamb += shift;
-    for (Eigen::Vector2d& jamb : door.far_jambs) jamb += shift;
-  }
-
-  for (auto& outline : plan.furniture) {
-    for (Eigen::Vector2d& corner : outline) corner += shift;
-  }
-
-  for (WallRoom& room : plan.rooms) {
-    for (Eigen::Vector2d& corner : room.outline) corner += shift;
-    room.label += shift;
-  }
-}
-
 /// Adds openings at free ends of walls whose jambs were both seen, and gives the lines that close the others.
 std::vector<WallLine> close_free_ends(const cloud::Cloud& cloud, double floor_m, WallPlan& plan) {
   constexpr double kSame_m = 0.3;
@@ -139,6 +111,33 @@ void set_thickness(std::vector<WallLine>& walls) {
 }
 
 }  // namespace
+
+WallPlan moved(WallPlan plan, const Eigen::Matrix2d& linear, const Eigen::Vector2d& origin) {
+  const double scale = linear.col(0).norm();
+  const auto move = [&](Eigen::Vector2d& place) { place = origin + linear * place; };
+  for (WallLine& wall : plan.walls) {
+    wall.normal = linear * wall.normal / scale;
+    wall.offset_m = scale * wall.offset_m + wall.normal.dot(origin);
+    const auto along = [&](double s) { return scale * s + wall.along().dot(origin); };
+    wall.s0 = along(wall.s0);
+    wall.s1 = along(wall.s1);
+
+    for (auto* parts : {&wall.openings, &wall.gaps}) {
+      for (WallOpening& part : *parts) part = {along(part.s0), along(part.s1)};
+    }
+  }
+
+  for (WallDoor& door : plan.doors) {
+    for (auto* jambs : {&door.jambs, &door.far_jambs}) std::for_each(jambs->begin(), jambs->end(), move);
+  }
+
+  for (auto& outline : plan.furniture) std::for_each(outline.begin(), outline.end(), move);
+  for (WallRoom& room : plan.rooms) {
+    std::for_each(room.outline.begin(), room.outline.end(), move);
+    move(room.label);
+  }
+  return plan;
+}
 
 core::Result<WallPlan> find_walls(MapSource& source) {
   if (auto up = source.need_upright("a plan"); !up) return tl::unexpected(up.error());
@@ -211,19 +210,27 @@ core::Result<WallPlan> find_walls(MapSource& source) {
   find_far_sides(plan.walls, plan.doors);
   measure_doors(points, floor_m, plan.doors);
 
+  constexpr double kThinnestOpening_m = 0.03;  // thinner ones are no cell between rooms
   if (plan.rays_known) {
-    const std::vector<WallLine> closings = close_free_ends(points, floor_m, plan);
+    std::vector<WallLine> closings = close_free_ends(points, floor_m, plan);
+    for (const WallDoor& door : plan.doors) {
+      if (door.depth_m() < kThinnestOpening_m) closings.push_back(closing_of(door));
+    }
     plan.rooms = rooms_in(box_of(plan.walls), plan.walls, closings, plan.doors, space);
   } else {
     plan.rooms = rooms_of(plan.walls);
   }
 
+  cut_walls_at(plan.doors, plan.walls);
+  find_leaves(points, floor_m, plan.walls, plan.doors);
+  const std::vector<WallDoor> windows = windows_of(points, floor_m, cut_m, plan.walls);
+  cut_walls_at(windows, plan.walls);
+  plan.doors.insert(plan.doors.end(), windows.begin(), windows.end());
+
   set_thickness(plan.walls);
   plan.furniture = furniture_outlines(points, floor_m, plan.walls);
   measure_heights(points, floor_m, plan.rooms);
-  move_plan((*cloud)->shift.head<2>(), plan);
-
-  return plan;
+  return moved(std::move(plan), Eigen::Matrix2d::Identity(), (*cloud)->shift.head<2>());
 }
 
 }  // namespace plumbline::exports

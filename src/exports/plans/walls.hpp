@@ -49,6 +49,8 @@ struct WallDoor {
   double sill_m = 0.0;                          ///< over the floor
   double head_m = 0.0;                          ///< over the floor; 0: not seen
   std::array<bool, 2> jamb_seen{false, false};  ///< else where the face of the wall ends
+  int hinge = -1;            ///< the jamb that its leaf hangs at; -1: the leaf was not seen
+  bool opens_front = false;  ///< the leaf opens to the side of `jambs`
 
   [[nodiscard]] double depth_m() const { return (far_jambs[0] - jambs[0]).norm(); }
 };
@@ -73,7 +75,7 @@ struct WallRoom {
 
 struct WallPlan {
   std::vector<WallLine> walls;
-  std::vector<WallDoor> doors;
+  std::vector<WallDoor> doors;  ///< and passages, windows
   std::vector<WallRoom> rooms;
   std::vector<std::vector<Eigen::Vector2d>> furniture;  ///< outlines of what stands between walls
   bool rays_known = false;                              ///< false: only doors below a lintel are found
@@ -102,8 +104,20 @@ void measure_heights(const cloud::Cloud& cloud, double floor_m, std::vector<Wall
 /// Outlines of what is seen from the height of a foot to that of a head and is no wall.
 std::vector<std::vector<Eigen::Vector2d>> furniture_outlines(const cloud::Cloud& cloud, double floor_m,
                                                              const std::vector<WallLine>& walls);
+/// The plan in other axes: places become origin + linear * place; lengths and areas that it tells stay.
+WallPlan moved(WallPlan plan, const Eigen::Matrix2d& linear, const Eigen::Vector2d& origin);
 /// The wall's pieces between its doors and gaps.
 std::vector<std::pair<double, double>> solid_pieces(const WallLine& wall);
+constexpr double kAssumedThickness_m = 0.1;
+/// Walls from above, without openings: outlines, holes in them, and whether their thickness is assumed
+/// because the other face was not seen. `unit`: of the plan for a metre.
+struct WallSolid {
+  std::vector<std::vector<Eigen::Vector2d>> rings;
+  bool assumed = false;
+};
+std::vector<WallSolid> wall_solids(const WallPlan& plan, double unit);
+/// Sentences on what the plan holds.
+std::vector<std::string> notes_of(const WallPlan& plan);
 /// The plan as JSON, described on the format's page.
 std::string plan_json(const WallPlan& plan, const std::string& frame, double floor_m, double cut_m);
 

@@ -15,14 +15,23 @@ if problems:
     sys.exit("\n".join(problems[:20]))
 space = plain.modelspace()
 layers = {entity.dxf.layer for entity in space}
-missing = {"walls", "dimensions", "grid", "path"} - layers
+missing = {"A-WALL", "A-WALL-PATT", "A-ANNO-DIMS", "A-ANNO"} - layers
 if missing or plain.dxfversion != "AC1015":
     sys.exit(f"{plain.dxfversion}, layers {sorted(layers)}")
 askew = [e.dxf.rotation for e in space.query("TEXT") if not -88.0 < (e.dxf.rotation + 180.0) % 360.0 - 180.0 <= 92.001]
 if askew:
     sys.exit(f"texts stand on their heads: {askew}")
-walls = [(e.dxf.start, e.dxf.end) for e in space.query('LINE[layer=="walls"]')]
-lengths = sorted(math.dist(a, b) for a, b in walls)
-texts = [e.dxf.text for e in space.query('TEXT[layer=="dimensions"]') if "m" not in e.dxf.text]
-whole = [t for t in texts if any(abs(float(t) - length) < 0.0051 for length in lengths)]
-print(f"{len(walls)} pieces of walls, {len(texts)} dimensions, {len(whole)} of walls without openings; 0 errors, 0 fixes")
+dimensions = space.query("DIMENSION")
+for d in dimensions:
+    block = plain.blocks.get(d.dxf.geometry)
+    if block is None or not d.dxf.geometry.startswith("*D") or d.dxf.dimstyle not in plain.dimstyles or len(block) < 3:
+        sys.exit(f"a dimension without its block or style: {d.dxf.geometry}, {d.dxf.dimstyle}")
+    said, measured = float(d.dxf.text.replace(",", ".")), d.dxf.actual_measurement
+    if abs(said - measured) > 0.001 or abs(d.get_measurement() - measured) > 0.001:
+        sys.exit(f"a dimension says {said}, group 42 {measured}, its places {d.get_measurement()}")
+hatches = space.query("HATCH")
+if not all(path.is_closed for hatch in hatches for path in hatch.paths):
+    sys.exit("a hatch is open")
+if not dimensions or not hatches:
+    sys.exit(f"{len(dimensions)} dimensions, {len(hatches)} hatches")
+print(f"{len(dimensions)} dimensions, {len(hatches)} hatches, {len(space.query('INSERT'))} symbols; 0 errors, 0 fixes")

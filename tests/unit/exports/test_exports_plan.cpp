@@ -82,11 +82,10 @@ TEST_F(ExportPlan, FindsWallsDoorsAndRooms) {
   ASSERT_FALSE(summary->notes.empty());
   EXPECT_EQ(summary->notes.front(), "8 walls, 1 doors, 2 closed rooms");
   const std::multiset<std::string> found = texts(bytes("plan.dxf"));
-  EXPECT_EQ(found.count("4.00"), 2U);
-  EXPECT_EQ(found.count("3.00"), 4U);
-  EXPECT_EQ(found.count("2.50"), 2U);
-  EXPECT_EQ(found.count("1: 12.00 m2"), 1U);
-  EXPECT_EQ(found.count("2: 7.50 m2"), 1U);
+  for (const char* length : {"4.000", "3.000", "2.500"}) EXPECT_EQ(found.count(length), 1U) << length;
+  EXPECT_EQ(found.count("1: 12.00 m\\U+00B2"), 1U);
+  EXPECT_EQ(found.count("2: 7.50 m\\U+00B2"), 1U);
+  EXPECT_EQ(found.count("D1"), 2U) << "on the plan and in the table";
 }
 
 TEST_F(ExportPlan, FindsTheFloorAndWallsAtLargeCoordinates) {
@@ -142,22 +141,138 @@ TEST_F(ExportPlan, WindowsAndHalfHeightWallsAreCutAtTheCut) {
     return summary ? summary->notes.front() : "";
   };
   EXPECT_EQ(note_at(0.6), "10 walls, 1 doors, 2 closed rooms");
-  EXPECT_EQ(lines("windows").size(), 0U);
+  EXPECT_EQ(lines("A-GLAZ").size(), 0U);
 
   for (const double cut_m : {1.2, 1.9}) {
     EXPECT_EQ(note_at(cut_m), "8 walls, 1 doors, 1 windows or gaps at the cut, 2 closed rooms");
-    const std::vector<std::array<double, 4>> windows = lines("windows");
+    const std::vector<std::array<double, 4>> windows = lines("A-GLAZ");
     ASSERT_EQ(windows.size(), 1U);
     EXPECT_NEAR(std::max(windows[0][0], windows[0][2]), 2.5, 0.03);
     EXPECT_NEAR(std::min(windows[0][0], windows[0][2]), 1.0, 0.03);
     EXPECT_NEAR(windows[0][1], 3.0, 0.005);
-    for (const auto& [x0, y0, x1, y1] : lines("walls")) {
+    for (const auto& [x0, y0, x1, y1] : lines("A-WALL")) {
       const bool across = std::abs(y0 - 3.0) < 0.01 && std::abs(y1 - 3.0) < 0.01 && std::min(x0, x1) < 1.7 &&
                           std::max(x0, x1) > 1.8;
       EXPECT_FALSE(across) << "a wall is drawn across the window";
     }
   }
   EXPECT_EQ(note_at(2.35), "8 walls, 0 doors, 2 closed rooms");
+}
+
+/// Measure and text of each dimension of a DXF.
+std::vector<std::pair<double, std::string>> dimensions_of(const std::string& dxf) {
+  std::vector<std::pair<double, std::string>> found;
+  const std::regex pattern("AcDbDimension\n[^A]*\n  1\n(.*)\n 71\n5\n 42\n(.*)\n  3\nPLAN\n");
+  for (std::sregex_iterator it(dxf.begin(), dxf.end(), pattern), end; it != end; ++it)
+    found.emplace_back(std::stod((*it)[2]), (*it)[1]);
+  return found;
+}
+
+TEST_F(ExportPlan, ASheetHasItsScaleItsTitleBlockAndDimensions) {
+  std::ofstream(path("block.yaml")) << "client: Somebody\nSurveyor: Herself\n";
+  ExportRequest wanted = request("plan.dxf");
+  wanted.options.paper = "A2";
+  wanted.options.scale = "1:50";
+  wanted.options.title = "Two rooms";
+  wanted.options.title_block = path("block.yaml").string();
+  wanted.options.decimal = "comma";
+  wanted.given = {"paper", "scale", "title", "title_block", "decimal"};
+  const auto summary = write(wanted);
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_EQ(summary->notes.back(), "1:50 on A2");
+
+  const std::string dxf = bytes("plan.dxf");
+  const std::multiset<std::string> found = texts(dxf);
+  for (const char* text : {"Two rooms", "Somebody", "Herself", "1:50 on A2", "12,00"})
+    EXPECT_GE(found.count(text), 1U) << text;
+  const auto dimensions = dimensions_of(dxf);
+  EXPECT_EQ(count(dxf, "\nDIMENSION\n"), dimensions.size());
+  ASSERT_GE(dimensions.size(), 5U) << "lengths and the door's clear width";
+  for (auto [measure, text] : dimensions) {
+    ASSERT_NE(text.find(','), std::string::npos) << text;
+    std::replace(text.begin(), text.end(), ',', '.');
+    EXPECT_NEAR(measure, std::stod(text), 5.1e-4);
+  }
+  EXPECT_TRUE(std::any_of(dimensions.begin(), dimensions.end(),
+                          [](const auto& d) { return std::abs(d.first - 0.9) < 0.03; }));
+}
+
+TEST_F(ExportPlan, ASheetThatDoesNotFitSaysWhatWould) {
+  ExportRequest wanted = request("plan.svg");
+  wanted.options.paper = "A4";
+  wanted.options.scale = "20";
+  wanted.given = {"paper", "scale"};
+  const auto nothing = write(wanted);
+  ASSERT_FALSE(nothing);
+  EXPECT_NE(nothing.error().message.find("which A4 does not hold"), std::string::npos)
+      << nothing.error().message;
+  wanted.options.scale = "1:many";
+  EXPECT_FALSE(write(wanted));
+  wanted.options.scale = "auto";
+  EXPECT_TRUE(write(wanted));
+}
+
+TEST_F(ExportPlan, LayersAreLeftOutInAllFiles) {
+  for (const char* form : {"svg", "dxf"}) {
+    for (const bool out : {false, true}) {
+      ExportRequest wanted = request(std::string("plan.") + form);
+      wanted.options.without = out ? "dims,furn" : "none";
+      wanted.given = {"without"};
+      ASSERT_TRUE(write(wanted));
+      EXPECT_EQ(texts(bytes("plan.dxf")).count("4.000") == 0 &&
+                    bytes(std::string("plan.") + form).find(">4.000<") == std::string::npos,
+                out)
+          << form;
+    }
+  }
+  ExportRequest wanted = request("plan.svg");
+  wanted.options.without = "doors";
+  const auto nothing = write(wanted);
+  ASSERT_FALSE(nothing);
+  EXPECT_NE(nothing.error().message.find("door"), std::string::npos) << nothing.error().message;
+}
+
+/// Area of an outline less that of its holes.
+double area_of(const WallSolid& solid) {
+  double area = 0.0;
+  for (const auto& ring : solid.rings) area += area_of(ring);
+  return area;
+}
+
+TEST(PlanSolids, FillBetweenFacesAndAssumeTheRest) {
+  const auto face = [](const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
+    WallLine wall;  // its front on the right of the way
+    const Eigen::Vector2d along = (to - from).normalized();
+    wall.normal = {along.y(), -along.x()};
+    wall.offset_m = wall.normal.dot(from);
+    wall.s0 = along.dot(from);
+    wall.s1 = along.dot(to);
+    return wall;
+  };
+  WallPlan plan;
+  plan.walls = {face({0, 0}, {4, 0}), face({3, 0.2}, {0, 0.2})};
+  const std::vector<WallSolid> solids = wall_solids(plan, 1.0);
+  ASSERT_EQ(solids.size(), 2U);
+  EXPECT_FALSE(solids[0].assumed);
+  EXPECT_NEAR(area_of(solids[0]), 3.0 * 0.2, 1e-3);
+  EXPECT_TRUE(solids[1].assumed);
+  EXPECT_NEAR(area_of(solids[1]), 1.0 * 0.1, 1e-3);
+}
+
+TEST(PlanOpenings, AreTurnedWithThePlan) {
+  WallPlan plan;
+  plan.walls.resize(1);
+  plan.walls[0] = {Eigen::Vector2d::UnitX(), 2.0, -1.0, 3.0};
+  plan.walls[0].openings = {{0.0, 1.0}};
+  plan.rooms.resize(1);
+  plan.rooms[0].label = {1.0, 2.0};
+  const Eigen::Matrix2d linear = 2.0 * Eigen::Rotation2Dd(0.3).toRotationMatrix();
+  const Eigen::Vector2d origin(500.0, 7000.0);
+  const WallPlan there = moved(plan, linear, origin);
+  for (const auto& [before, after] :
+       {std::pair(-1.0, there.walls[0].s0), std::pair(1.0, there.walls[0].openings[0].s1)})
+    EXPECT_LT((there.walls[0].at(after) - origin - linear * plan.walls[0].at(before)).norm(), 1e-9);
+  EXPECT_LT((there.rooms[0].label - origin - linear * plan.rooms[0].label).norm(), 1e-9);
 }
 
 TEST_F(ExportPlan, SameCloudSameBytes) {
@@ -173,7 +288,8 @@ TEST_F(ExportPlan, ASectionShowsWhatItMeets) {
   ExportRequest wanted = request("section.svg");
   wanted.options.section = {-1.0, 2.5, 5.0, 2.5};
   wanted.given = {"section"};
-  ASSERT_TRUE(write(wanted));
+  const auto summary = write(wanted);
+  ASSERT_TRUE(summary) << summary.error().message;
   EXPECT_GT(count(bytes("section.svg"), "fill=\"#000000\""), 100U) << "cells of three walls";
   wanted.options.section = {10.0, 10.0, 11.0, 10.0};
   EXPECT_FALSE(write(wanted));

@@ -147,6 +147,20 @@ std::string facts(const ReportData& data) {
                      {"Version", "plumbline " + text_at(s, "/version")}});
 }
 
+/// The logo as a part of the page.
+core::Result<std::string> logo_html(const std::filesystem::path& file) {
+  if (file.empty()) return std::string();
+  const std::string bytes = read_bytes(file);
+  const std::string kind = bytes.rfind("\x89PNG", 0) == 0              ? "png"
+                           : bytes.rfind("\xFF\xD8", 0) == 0           ? "jpeg"
+                           : bytes.find("</svg>") != std::string::npos ? "svg+xml"
+                                                                       : "";
+  if (kind.empty())
+    return core::input_error(
+        fmt::format("{}: is no picture for a logo; give a PNG, JPEG or SVG file", file.string()));
+  return fmt::format("<img class=\"logo\" alt=\"\" src=\"data:image/{};base64,{}\"/>\n", kind, base64(bytes));
+}
+
 }  // namespace
 
 std::string lost_html(const ReportData& data) {
@@ -175,13 +189,20 @@ std::string lost_html(const ReportData& data) {
   return out;
 }
 
-std::string head_html(const ReportData& data) {
-  std::string out =
-      "<header><p class=\"kicker\">Plumbline report</p><h1>" + viz::markup_text(data.name) + "</h1>\n";
-  out += verdict_html(data);
+std::string run_html(const ReportData& data) {
   const std::string lost = lost_html(data);
-  if (!lost.empty()) out += "<h3>Stretches without a pose, the longest first</h3>\n" + lost;
-  return out + figures_html(data) + facts(data) + "</header>\n";
+  return (lost.empty() ? "" : "<h3>Stretches without a pose, the longest first</h3>\n" + lost) +
+         figures_html(data) + facts(data);
+}
+
+core::Result<std::string> head_html(const ReportData& data, const ReportRequest& request) {
+  auto logo = logo_html(request.logo);
+  if (!logo) return logo;
+  const std::string title = request.title.empty() ? data.name : request.title;
+  return "<header>" + *logo + "<p class=\"kicker\">Plumbline report</p><h1>" + viz::markup_text(title) +
+         "</h1>\n" +
+         facts_html({{"Client", request.client}, {"Address", request.address}, {"Recorded", request.date}}) +
+         verdict_html(data) + data.plan_html + "</header>\n";
 }
 
 }  // namespace plumbline::report

@@ -5,6 +5,27 @@
 #include "report_sections.hpp"
 
 namespace plumbline::report {
+namespace {
+
+/// The plan at the page's width, and its tables.
+std::string plan_html(const exports::PlanPage& plan) {
+  if (plan.svg.empty()) return {};
+  std::string out =
+      "<figure class=\"plan\"><img alt=\"Floor plan\" src=\"data:image/svg+xml;base64," + base64(plan.svg) +
+      "\"/><figcaption>Lengths in metres. Hatched: both faces of the wall were seen; dashed grey: the other "
+      "face was not; dashed blue: assumed, or the limit of what was seen.</figcaption></figure>\n";
+  for (const exports::PlanPage::Table& table : plan.tables) {
+    std::string columns;
+    for (const std::string& column : table.columns)
+      columns += (columns.empty() ? "" : column == "Kind" ? "|" : "|>") + column;
+    HtmlTable html(columns);
+    for (const auto& row : table.rows) html.row(row);
+    out += "<div class=\"half\"><h3>" + viz::markup_text(table.title) + "</h3>\n" + html.html() + "</div>\n";
+  }
+  return out;
+}
+
+}  // namespace
 
 core::Result<std::string> viewer_html(ReportData& data, const ReportRequest& request,
                                       const core::Executor& executor, core::Log& log) {
@@ -26,6 +47,7 @@ core::Result<std::string> viewer_html(ReportData& data, const ReportRequest& req
     return std::string();
   }
 
+  data.plan_html = plan_html(view->plan);
   view->scene.name = data.name;
   view->scene.clouds.front().name = data.name;
   const std::string placing =
