@@ -7,6 +7,8 @@
 #include <set>
 #include <utility>
 
+#include "plumbline/maps/map_selection.hpp"
+
 namespace plumbline::maps {
 namespace {
 
@@ -38,27 +40,14 @@ void add_landmarks(const Map& map, const std::vector<Id>& ids, const std::set<Ke
   }
 }
 
-}  // namespace
-
-KeyframeId root_of(const Map& map, KeyframeId keyframe) {
-  for (KeyframeId above = map.parent(keyframe); above.valid(); above = map.parent(keyframe)) keyframe = above;
-  return keyframe;
-}
-
-std::vector<KeyframeId> roots(const Map& map) {
-  std::vector<KeyframeId> found = map.keyframe_ids();
-  found.erase(
-      std::remove_if(found.begin(), found.end(), [&](KeyframeId id) { return map.parent(id).valid(); }),
-      found.end());
-  return found;
-}
-
-Map component(const Map& map, KeyframeId root) {
-  const std::set<KeyframeId> inside = members(map, root);
+/// These keyframes as a map of their own; each is attached to its nearest ancestor among them.
+Map selection(const Map& map, const std::set<KeyframeId>& inside) {
   const MapChanges whole = map.changes_since({});
   MapParts parts;
   for (const MapParts::KeyframePart& keyframe : whole.keyframes) {
-    if (inside.count(keyframe.data->id) != 0) parts.keyframes.push_back(keyframe);
+    if (inside.count(keyframe.data->id) == 0) continue;
+    KeyframeId& parent = parts.keyframes.emplace_back(keyframe).parent;
+    while (parent.valid() && inside.count(parent) == 0) parent = map.parent(parent);
   }
 
   add_landmarks(map, map.point_ids(), inside, parts.points);
@@ -74,6 +63,37 @@ Map component(const Map& map, KeyframeId root) {
 
   parts.next = whole.next;
   return Map(std::move(parts));
+}
+
+}  // namespace
+
+KeyframeId root_of(const Map& map, KeyframeId keyframe) {
+  for (KeyframeId above = map.parent(keyframe); above.valid(); above = map.parent(keyframe)) keyframe = above;
+  return keyframe;
+}
+
+std::vector<KeyframeId> roots(const Map& map) {
+  std::vector<KeyframeId> found = map.keyframe_ids();
+  found.erase(
+      std::remove_if(found.begin(), found.end(), [&](KeyframeId id) { return map.parent(id).valid(); }),
+      found.end());
+  return found;
+}
+
+Map component(const Map& map, KeyframeId root) { return selection(map, members(map, root)); }
+
+Map without(const Map& map, const std::set<KeyframeId>& keyframes) {
+  std::set<KeyframeId> inside;
+  for (const KeyframeId id : map.keyframe_ids()) {
+    if (keyframes.count(id) == 0) inside.insert(id);
+  }
+
+  Map result = selection(map, inside);
+  for (const core::PointId id : result.point_ids()) {
+    const std::size_t seen = std::as_const(result).point(id).observations.size();
+    if (seen != map.point(id).observations.size()) result.refresh_point(id);
+  }
+  return result;
 }
 
 void move_component(Map& map, KeyframeId root, const geometry::Rigid3& new_from_old_world) {

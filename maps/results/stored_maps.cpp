@@ -37,19 +37,20 @@ std::string free_name(const std::string& name, std::set<std::string>& taken) {
 }  // namespace
 
 core::Result<std::unique_ptr<StoredMaps>> StoredMaps::open(const std::vector<fs::path>& maps,
-                                                           const core::Executor& executor) {
+                                                           const core::Executor& executor, PartOrder order) {
   std::unique_ptr<StoredMaps> result(new StoredMaps);
   std::vector<std::optional<core::Result<StoredPart>>> parts(maps.size());
-  executor.parallel_for(maps.size(), [&](std::size_t i) { parts[i].emplace(read_part(maps[i])); });
+  executor.parallel_for(maps.size(), [&](std::size_t i) { parts[i].emplace(read_part(maps[i], order)); });
   for (auto& part : parts) {
     if (!part->has_value()) return tl::unexpected(part->error());
     result->parts_.push_back(std::move(**part));
   }
+  if (order == PartOrder::kByContent) result->sort_by_content(executor);
   if (auto arranged = result->arrange(executor); !arranged) return tl::unexpected(arranged.error());
   return result;
 }
 
-core::Result<StoredPart> StoredMaps::read_part(const fs::path& map) {
+core::Result<StoredPart> StoredMaps::read_part(const fs::path& map, PartOrder order) {
   std::error_code ec;
   const fs::path file = fs::is_directory(map, ec) ? map / "map.db" : map;
   if (!fs::exists(file, ec)) {
@@ -65,23 +66,15 @@ core::Result<StoredPart> StoredMaps::read_part(const fs::path& map) {
 
   StoredPart part{core::folder_name(name_of(file)), std::move(*run), {}};
   part.robots = part.run.stored().header.robots;
-  if (part.robots.size() == 1) part.robots.front().name = part.name;
+  if (order == PartOrder::kByContent && part.robots.size() == 1) part.robots.front().name = part.name;
+  if (order == PartOrder::kAsGiven) part.name = core::folder_name(part.robots.front().name);
   return part;
 }
 
-/// The order of parts, the numbers and names of robots: by content.
-core::Result<void> StoredMaps::arrange(const core::Executor& executor) {
+void StoredMaps::sort_by_content(const core::Executor& executor) {
   std::vector<std::uint64_t> hashes(parts_.size());
   executor.parallel_for(parts_.size(),
                         [&](std::size_t p) { hashes[p] = content_hash(parts_[p].run.stored().map); });
-
-  std::set<std::string> files;
-  for (const StoredPart& part : parts_) {
-    std::error_code ec;
-    if (!files.insert(fs::weakly_canonical(part.run.file(), ec).string()).second) {
-      return core::usage_error(fmt::format("{}: is given twice", part.run.file().string()));
-    }
-  }
 
   std::vector<std::size_t> order(parts_.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -94,6 +87,17 @@ core::Result<void> StoredMaps::arrange(const core::Executor& executor) {
   sorted.reserve(order.size());
   for (const std::size_t i : order) sorted.push_back(std::move(parts_[i]));
   parts_ = std::move(sorted);
+}
+
+/// The numbers and names of robots.
+core::Result<void> StoredMaps::arrange(const core::Executor& executor) {
+  std::set<std::string> files;
+  for (const StoredPart& part : parts_) {
+    std::error_code ec;
+    if (!files.insert(fs::weakly_canonical(part.run.file(), ec).string()).second) {
+      return core::usage_error(fmt::format("{}: is given twice", part.run.file().string()));
+    }
+  }
 
   std::set<std::string> part_names;
   std::set<std::string> robot_names;

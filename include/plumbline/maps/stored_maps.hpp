@@ -27,6 +27,12 @@ struct StoredCloud {
   std::size_t view = 0;  ///< index into the store's views
 };
 
+/// Order of the parts of several maps.
+enum class PartOrder {
+  kByContent,  ///< the one with most keyframes first
+  kAsGiven,    ///< the first one is the map that the others are visits of; robots keep their names
+};
+
 /// Parts are ordered by their contents: the one with most keyframes first. Robots are numbered in this order;
 /// of several with the same name, later ones get a number appended (`name-2`).
 class StoredMaps {
@@ -34,7 +40,8 @@ class StoredMaps {
   /// `maps`: result folders, or files map.db. Errors (kInput): missing, no map.db, damaged, not finished,
   /// no keyframes; (kUsage) the same map twice.
   static core::Result<std::unique_ptr<StoredMaps>> open(const std::vector<std::filesystem::path>& maps,
-                                                        const core::Executor& executor);
+                                                        const core::Executor& executor,
+                                                        PartOrder order = PartOrder::kByContent);
 
   [[nodiscard]] const std::vector<StoredPart>& parts() const { return parts_; }
   [[nodiscard]] const std::vector<StoredCloud>& clouds() const { return clouds_; }
@@ -50,7 +57,8 @@ class StoredMaps {
 
  private:
   StoredMaps() = default;
-  static core::Result<StoredPart> read_part(const std::filesystem::path& map);
+  static core::Result<StoredPart> read_part(const std::filesystem::path& map, PartOrder order);
+  void sort_by_content(const core::Executor& executor);
   core::Result<void> arrange(const core::Executor& executor);
 
   std::vector<StoredPart> parts_;

@@ -27,6 +27,7 @@
 namespace plumbline::pipeline {
 
 using maps::RobotInfo;
+struct RevisedClouds;
 
 /// One line of frames.csv.
 struct FrameRow {
@@ -86,6 +87,8 @@ struct MapResult : maps::MapPoses {
   /// themselves.
   std::vector<std::shared_ptr<const MapResult>> apart;
   std::string name;  ///< of such a component
+  std::shared_ptr<const RevisedClouds> revised =
+      nullptr;  ///< of a map that was visited again; null: no other
 };
 
 /// Filtered cloud of one keyframe, or of a frame between keyframes, in the camera frame; or, for such a

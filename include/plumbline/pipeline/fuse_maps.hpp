@@ -18,7 +18,10 @@ namespace plumbline::pipeline {
 struct FuseRequest : RunRequest {
   FuseRequest() { pipeline = "fuse"; }
   std::vector<std::filesystem::path> maps;  ///< result folders, or files map.db
-  std::string anchor;                       ///< robot or map that defines the common frame; empty: by content
+  /// Map that `maps` are visits of: its frame and, unless a new loop closes, its poses stay. It does not
+  /// change on disk. Empty: all maps are equal.
+  std::filesystem::path into;
+  std::string anchor;  ///< robot or map that defines the common frame; empty: by content
 };
 
 /// The result does not depend on the order of `maps`; a single one is refined and fused. Errors as

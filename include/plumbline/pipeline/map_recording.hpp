@@ -27,7 +27,11 @@ struct MapRequest : RunRequest {
   dataset::OpenOptions open;        ///< format, camera, from, to, every
   /// A finished map in which the recording is located, by a pipeline with a localize stage; empty: none.
   std::filesystem::path known_map;
-  bool resume = false;  ///< continue an interrupted run from OUT.partial
+  /// A finished map that the recording is another visit of: it is joined to what is there, what is gone is
+  /// left out, and the result holds both. The map stays as it is on disk. Empty: none.
+  std::filesystem::path into;
+  std::string into_contents;  ///< set by map_recording: a text that changes with that map
+  bool resume = false;        ///< continue an interrupted run from OUT.partial
   /// Highest rate at which each recording is played, frames a second; 0: as fast as possible.
   double pace_hz = 0.0;
   /// Folder for one picture of the tracker's view per frame; empty: none.
@@ -48,6 +52,9 @@ struct MapRequest : RunRequest {
 /// True if there is nothing to resume: OUT is whole and no run was interrupted since. A complete result that
 /// a killed run has not renamed to OUT is renamed. Error (kOutput): it cannot be, as something else is there.
 core::Result<bool> is_finished(const std::filesystem::path& out, bool replace);
+
+/// Folder in which a visit (MapRequest::into) is mapped by itself before it is joined to the map.
+std::filesystem::path visit_folder(const std::filesystem::path& out);
 
 /// Robots are numbered by the names of their folders (where these are alike, by the folders that they lie
 /// in): the order of `input` and `others` changes nothing. Checks everything first (pipeline: kUsage,

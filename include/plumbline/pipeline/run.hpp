@@ -15,8 +15,16 @@ namespace plumbline::pipeline {
 
 class RunObserver;
 
+/// Part of a pipeline that is run; another visit of a map runs them one after another.
+enum class PipelinePart {
+  kWhole,
+  kMapping,  ///< from the recording to its own map.db
+  kJoining,  ///< from finished maps to the result
+};
+
 /// Request that `map` and `fuse` have in common.
 struct RunRequest {
+  PipelinePart part = PipelinePart::kWhole;
   std::filesystem::path output;            ///< the result folder
   std::string pipeline;                    ///< shipped name or file
   std::vector<std::string> overrides;      ///< stage.key=value

@@ -144,6 +144,7 @@ struct RunInput {
   const std::vector<maps::RobotInfo>* robots = nullptr;  ///< robots of the recordings or maps, by number
   std::shared_ptr<const localize::LocalizationMap>
       known_map;       ///< map of a localize stage; null: there is none
+  bool into = false;   ///< the other stored maps are visits of the first one
   std::string anchor;  ///< robot that defines the common frame of finished maps; empty: any
   std::string text;    ///< text that identifies what is mapped
 };

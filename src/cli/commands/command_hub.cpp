@@ -86,6 +86,11 @@ void add_hub(CLI::App& app, Session& session) {
       ->check(CLI::PositiveNumber);
   command->add_option("--anchor", request->fuse.anchor, "Robot whose map defines the frame of the result")
       ->type_name("NAME");
+  command
+      ->add_option(
+          "--into", request->fuse.into,
+          "Finished map (result folder or map.db) that all robots visit, as for map; it stays as it is")
+      ->type_name("MAP");
   command->add_flag("--resume", request->resume, "Continue an interrupted hub from OUT.partial");
   add_pipeline_options(*command, session, request->fuse);
 }

@@ -66,7 +66,8 @@ int map(Session& session, pipeline::MapRequest request, const std::vector<std::s
     return session.fail(prepared.error());
 
   Console& console = session.console();
-  const auto live = live_map(page, request.output, console);
+  const auto live =
+      live_map(page, request.into.empty() ? request.output : pipeline::visit_folder(request.output), console);
   if (!live) return session.fail(live.error());
 
   const auto summary = pipeline::map_recording(request, session.executor(), console, stop_on_signals(),
@@ -144,6 +145,12 @@ void add_map(CLI::App& app, Session& session) {
           "Convention of the poses that come with a recording: inverted (camera from world), opengl (y up, z "
           "backwards), wxyz (quaternions begin with w)")
       ->check(CLI::IsMember({"inverted", "opengl", "wxyz"}));
+  command
+      ->add_option(
+          "--into", request->into,
+          "Another visit of this map (result folder or map.db), which stays as it is: OUT holds both, in "
+          "its frame, without what is gone")
+      ->type_name("MAP");
   add_frames_options(*command, *publish);
   add_map_options(*command, session, *request);
   add_live_options(*command, *page);

@@ -39,6 +39,7 @@ const Keys kAdvanced{
              "icp.max_turn adjust.observations adjust.iterations adjust.aligned_sigma adjust.line_sigma "
              "adjust.depth_factor adjust.surface_weight adjust.turn_rate adjust.gate")},
     {"fuse", keys_in("min_cos_incidence")},
+    {"visit", keys_in("share_new views cells apart turned")},
 };
 
 /// Options without a known use: accepted, but not listed anywhere.

@@ -28,7 +28,7 @@ void flatten(const core::ConfigNode& node, const std::string& path, Values& valu
 /// True for settings that change neither the map nor its files: names, and inputs that are compared by
 /// content.
 bool of_no_matter(const std::string& path) {
-  for (const char* key : {"run.input", "run.folder", "run.pipeline", "run.camera", "run.format",
+  for (const char* key : {"run.input", "run.folder", "run.into", "run.pipeline", "run.camera", "run.format",
                           "run.threads", "description"}) {
     if (path == key) return true;
   }
@@ -139,6 +139,16 @@ void remove_store(const fs::path& file) {
 }
 
 }  // namespace
+
+core::Result<void> check_contents(const fs::path& folder, const std::string& contents) {
+  const fs::path file = folder / maps::kStoreFile;
+  const auto store = maps::StoreReader::open(file);
+  if (!store) return tl::unexpected(store.error());
+  const Values values = values_of(store->header().configuration);
+  const auto before = values.find("run.contents_of_map");
+  return check_same(file, "map", "contents: " + (before == values.end() ? "none" : before->second),
+                    "contents: " + contents);
+}
 
 std::string to_line(const FrameRow& row) {
   return fmt::format("{},{},{}", row.frame, row.state, row.columns);

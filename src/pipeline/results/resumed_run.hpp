@@ -37,6 +37,10 @@ core::Result<std::optional<ResumedRun>> open_resumed(const std::filesystem::path
                                                      const std::string& input,
                                                      const RobotRecordings& recordings);
 
+/// Checks that the finished run in `folder` was a visit of a map with these contents
+/// (MapRequest::into_contents). Errors: kUsage, it was not; kInput, damaged.
+core::Result<void> check_contents(const std::filesystem::path& folder, const std::string& contents);
+
 /// Number of keyframes in the store of `folder`; 0 if there is no readable store.
 std::size_t stored_keyframes(const std::filesystem::path& folder);
 

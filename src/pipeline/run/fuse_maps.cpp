@@ -21,6 +21,7 @@ std::string config_text(const FuseRequest& request, const maps::StoredMaps& maps
     text += fmt::format("{}\"{}\"", p == 0 ? "" : ", ", maps.parts()[p].name);
   }
   text += fmt::format("]\n  anchor: \"{}\"\n", request.anchor);
+  if (!request.into.empty()) text += "  into: on\n";
   return text + to_yaml(graph);
 }
 
@@ -31,7 +32,9 @@ std::string names_of(const maps::StoredMaps& maps) {
 }
 
 core::Result<Graph> load_fusion(const FuseRequest& request) {
-  auto graph = load_pipeline(request);
+  RunRequest wanted = request;
+  if (!request.into.empty()) wanted.part = PipelinePart::kJoining;
+  auto graph = load_pipeline(wanted);
   if (!graph) return graph;
   if (graph->source().stage->reads_maps()) return graph;
   return core::usage_error(fmt::format(
@@ -42,6 +45,11 @@ core::Result<Graph> load_fusion(const FuseRequest& request) {
 core::Result<std::unique_ptr<maps::StoredMaps>> open_maps(const FuseRequest& request,
                                                           const core::Executor& executor) {
   if (request.maps.empty()) return core::usage_error("name a map");
+  if (!request.into.empty()) {
+    std::vector<std::filesystem::path> all = request.maps;
+    all.insert(all.begin(), request.into);
+    return maps::StoredMaps::open(all, executor, maps::PartOrder::kAsGiven);
+  }
   auto maps = maps::StoredMaps::open(request.maps, executor);
   if (!maps || request.anchor.empty()) return maps;
   if (const auto part = (*maps)->find_part(request.anchor); !part) return tl::unexpected(part.error());
@@ -57,7 +65,9 @@ RunContext context_of(const FuseRequest& request, const maps::StoredMaps& maps, 
   context.input.anchor = request.anchor;
   context.input.text = names_of(maps);
   context.store.configuration = config_text(request, maps, graph);
-  context.store.keeps_clouds = keeps_clouds(graph);
+  context.input.into = !request.into.empty();
+  // What a visit says about clouds is known when all of them were read.
+  context.store.keeps_clouds = keeps_clouds(graph) && request.into.empty();
   context.hooks.observer = request.observer.get();
   context.hooks.finishing = request.finishing;
   return context;

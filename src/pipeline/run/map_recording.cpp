@@ -26,6 +26,7 @@
 #include "robots/camera_refinement.hpp"
 #include "run/result.hpp"
 #include "run/run_summary.hpp"
+#include "visits/map_into.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -55,6 +56,10 @@ std::string config_text(const MapRequest& request, const Graph& graph, int threa
   text += fmt::format("  input: {}\n  pipeline: {}\n", quoted(request.input), quoted(request.pipeline));
 
   if (!request.known_map.empty()) text += fmt::format("  map: {}\n", quoted(request.known_map.string()));
+  if (!request.into.empty()) {
+    text += fmt::format("  into: {}\n  contents_of_map: {}\n", quoted(request.into.string()),
+                        request.into_contents);
+  }
   if (const std::string folder = folder_from_result(request); !folder.empty()) {
     text += fmt::format("  folder: {}  # in which the program was run, seen from this one\n", quoted(folder));
   }
@@ -396,6 +401,8 @@ core::Result<RunSummary> map_recording(const MapRequest& given, const core::Exec
   const auto began = RunClock::now();
   const auto request = in_order(given);
   if (!request) return tl::unexpected(request.error());
+  if (!request->into.empty() && request->part == PipelinePart::kWhole)
+    return map_into(*request, executor, log, stop, progress);
   MapRun run(*request, executor, log);
   if (auto opened = run.open(); !opened) return tl::unexpected(opened.error());
   return run.run(stop, progress, began);

@@ -7,6 +7,7 @@
 #include "plumbline/exports/export.hpp"
 #include "plumbline/pipeline/input.hpp"
 #include "run/run_summary.hpp"
+#include "visits/visit_pipeline.hpp"
 
 namespace plumbline::pipeline {
 
@@ -16,7 +17,20 @@ core::Result<Graph> load_pipeline(const RunRequest& request) {
   StageRegistry registry;
   register_stages(registry);
   registry.filters() = request.filters;
-  return load_graph(*file, registry, request.pipelines_folder, request.overrides);
+  if (request.part == PipelinePart::kWhole)
+    return load_graph(*file, registry, request.pipelines_folder, request.overrides);
+
+  // Options of the stage that joining adds are not those of the file.
+  std::vector<std::string> of_file, of_visit;
+  for (const std::string& text : request.overrides)
+    (text.rfind(std::string(kVisitStage) + ".", 0) == 0 ? of_visit : of_file).push_back(text);
+  const auto whole = load_graph(*file, registry, request.pipelines_folder, of_file);
+  if (!whole) return tl::unexpected(whole.error());
+  const bool joins = request.part == PipelinePart::kJoining;
+  const auto yaml = joins ? joining_part(*whole) : mapping_part(*whole);
+  if (!yaml) return tl::unexpected(yaml.error());
+  return parse_graph(*yaml, *file, registry, request.pipelines_folder,
+                     joins ? of_visit : std::vector<std::string>());
 }
 
 RunSummary summary_of_run(const Graph& graph, const RunReport& report, const RunRequest& request,

@@ -18,6 +18,7 @@ void register_stages(StageRegistry& registry) {
 
   registry.add(maps_stage());
   registry.add(merge_stage());
+  registry.add(visit_stage());
   registry.add(check_stage());
   registry.add(output_stage());
 

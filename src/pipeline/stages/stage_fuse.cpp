@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,9 +23,30 @@
 #include "robots/robot_bodies.hpp"
 #include "stages/stages.hpp"
 #include "summary/sections.hpp"
+#include "visits/revised_clouds.hpp"
 
 namespace plumbline::pipeline {
 namespace {
+
+void remove(const std::set<RevisedClouds::View>& left_out, maps::StoredViews& views) {
+  maps::StoredViews kept = views;
+  kept.keyframes.clear();
+  kept.frames.clear();
+  kept.world_from_camera.clear();
+  kept.robots.clear();
+  kept.stamps.clear();
+  kept.velocities.clear();
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (left_out.count({views.keyframes[i], views.frames[i]}) != 0) continue;
+    kept.keyframes.push_back(views.keyframes[i]);
+    kept.frames.push_back(views.frames[i]);
+    kept.world_from_camera.push_back(views.world_from_camera[i]);
+    kept.robots.push_back(views.robots[i]);
+    kept.stamps.push_back(views.stamps[i]);
+    kept.velocities.push_back(views.velocities[i]);
+  }
+  views = std::move(kept);
+}
 
 class FuseStage : public Stage {
  public:
@@ -109,14 +131,16 @@ class FuseStage : public Stage {
   /// The clouds of one connected map as one, filtered, in the frame of the output.
   core::Result<std::shared_ptr<DenseCloud>> lay_down(const MapResult& map, const maps::StoreReader& stored,
                                                      Report& report) {
-    const auto views = views_of(stored, map, map.robots, clouds_->arrivals());
+    auto views = views_of(stored, map, map.robots, clouds_->arrivals());
     if (!views) return tl::unexpected(views.error());
+    revised_ = map.revised;
+    if (revised_ != nullptr) remove(revised_->left_out, *views);
     auto fused = fuse(map, *views);
     if (!fused) return tl::unexpected(fused.error());
 
     auto dense = std::make_shared<DenseCloud>();
     dense->voxel_m = options_.voxels.voxel_m;
-    report.frame = find_up(up_, yaw_, fused->cloud, map.trajectory);
+    report.frame = frame_of(map, fused->cloud);
     dense->output_from_map = report.frame.output_from_map;
     dense->upright = report.frame.up != "none";
     dense->state = state_;
@@ -145,6 +169,13 @@ class FuseStage : public Stage {
     }
 
     return dense;
+  }
+
+  /// A map that was visited again keeps its frame.
+  [[nodiscard]] UpFrame frame_of(const MapResult& map, const cloud::CloudConstPtr& cloud) const {
+    if (!context_->input.into || !map.name.empty()) return find_up(up_, yaw_, cloud, map.trajectory);
+    const maps::ResultFrame& frame = context_->input.stored_maps->parts().front().run.stored().result;
+    return {frame.output_from_map, frame.upright ? "map" : "none", frame.upright ? "map" : "none"};
   }
 
   core::Result<cloud::FusedCloud> fuse(const MapResult& map, const maps::StoredViews& stored) {
@@ -187,6 +218,7 @@ class FuseStage : public Stage {
   /// Reads a view. An error in a finished map names that map's own file.
   [[nodiscard]] core::Result<cloud::CloudPtr> read(const maps::StoredViews& views, std::size_t i) const {
     auto cloud = views.read(i);
+    if (cloud && revised_ != nullptr) revised_->apply({views.keyframes[i], views.frames[i]}, **cloud);
     if (cloud || context_->input.stored_maps == nullptr) return cloud;
     return tl::unexpected(
         context_->input.stored_maps->damaged(views.keyframes[i], views.frames[i], cloud.error()));
@@ -199,6 +231,7 @@ class FuseStage : public Stage {
   bool keyframe_clouds_ = false;
   ChainOption filters_{"filters/map.yaml"};
   std::optional<WaitingClouds> clouds_;
+  std::shared_ptr<const RevisedClouds> revised_;  ///< of the map that is fused; null: all are as they were
   std::shared_ptr<maps::FusionState> state_ = std::make_shared<maps::FusionState>();
   Report report_;
 };

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // maps: finished maps of robots; their clouds come one after another.
+#include <algorithm>
 #include <memory>
 #include <utility>
 
+#include "plumbline/maps/components.hpp"
 #include "plumbline/maps/stored_maps.hpp"
 #include "robots/camera_refinement.hpp"
 #include "robots/robot_components.hpp"
@@ -17,6 +19,7 @@ class MapsStage : public Stage {
   core::Result<void> start(const RunContext& context) override {
     log_ = context.log;
     maps_ = context.input.stored_maps;
+    into_ = context.input.into;
     if (maps_ == nullptr) {
       return core::usage_error("a pipeline that begins with finished maps is run by plumbline fuse");
     }
@@ -47,7 +50,18 @@ class MapsStage : public Stage {
     for (const maps::StoredPart& part : maps_->parts()) {
       const maps::StoredMap& stored = part.run.stored();
       const RobotMap whole{part.name, part.robots, std::make_shared<maps::Map>(stored.map), stored.frames};
+      const std::size_t first = result->maps.size();
       for (RobotMap& component : components_of(whole).maps) result->maps.push_back(std::move(component));
+      if (!into_) continue;
+
+      // The map that is visited begins with its main component; a visit is a component of it, joined or not.
+      if (first > 0) {
+        for (std::size_t m = first; m < result->maps.size(); ++m) result->maps[m].component = true;
+        continue;
+      }
+      const core::KeyframeId root = maps::main_root(stored.map, stored.frames);
+      std::stable_partition(result->maps.begin(), result->maps.end(),
+                            [&](const RobotMap& map) { return map.map->has_keyframe(root); });
     }
     io.output<RobotMaps>("maps", result);
     for (const Json& pair : camera_pairs(maps_->robots())) log_->info(pair.at("text").get<std::string>());
@@ -65,6 +79,7 @@ class MapsStage : public Stage {
  private:
   core::Log* log_ = nullptr;
   const maps::StoredMaps* maps_ = nullptr;
+  bool into_ = false;
 };
 
 }  // namespace

@@ -209,6 +209,7 @@ class MergeStage : public Stage {
     std::size_t anchor = maps.size();
     if (!context_->input.anchor.empty())
       anchor = *context_->input.stored_maps->find_part(context_->input.anchor);
+    if (context_->input.into) anchor = 0;
     merged_ = merge_robots(maps, anchor, options_, *context_->executor, *context_->log);
     if (!live_) return;
     for (RobotMerge& merge : merged_.merges) live_->date(merge);

@@ -15,6 +15,7 @@
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "results/resumed_run.hpp"
 #include "stages/stages.hpp"
+#include "visits/revised_clouds.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -69,7 +70,7 @@ class StoreStage : public Stage {
     const auto cloud = io.input<KeyframeCloud>("cloud");
 
     std::vector<maps::StoreCloud> clouds;
-    if (cloud != nullptr && (cloud->id.valid() || cloud->frame.valid())) {
+    if (cloud != nullptr && !context_->input.into && (cloud->id.valid() || cloud->frame.valid())) {
       auto waiting = store_cloud_of(*cloud);
       if (!waiting) return tl::unexpected(waiting.error());
       clouds.push_back(std::move(*waiting));
@@ -102,11 +103,15 @@ class StoreStage : public Stage {
       }
     }
 
+    if (map->revised != nullptr) {
+      if (auto added = add_revised(*map->revised); !added) return added;
+    }
+
     std::vector<maps::StoreStep> rest;
     for (auto& [robot, step] : steps_) rest.push_back(std::move(step));
     rest.emplace_back();
     rest.back().pictures =
-        context_->input.stored_maps != nullptr ? stored_pictures() : corrected_pictures(*map);
+        context_->input.stored_maps != nullptr ? stored_pictures(*map) : corrected_pictures(*map);
 
     auto saved = map->apart.empty()
                      ? writer_->save_final(*map->map, map->frame_poses, frame, rest, map->robots)
@@ -146,6 +151,18 @@ class StoreStage : public Stage {
     pictures.push_back(std::move(picture));
   }
 
+  /// The clouds of a map that was visited again.
+  core::Result<void> add_revised(const RevisedClouds& revised) {
+    for (const maps::StoredCloud& stored : context_->input.stored_maps->clouds()) {
+      const maps::StoredViews& views = context_->input.stored_maps->views_of(stored);
+      if (revised.left_out.count({views.keyframes[stored.view], views.frames[stored.view]}) != 0) continue;
+      const auto cloud = revised.stored(views, stored.view);
+      if (!cloud) return tl::unexpected(cloud.error());
+      if (auto added = writer_->add_cloud(*cloud); !added) return added;
+    }
+    return {};
+  }
+
   /// Whole pictures of keyframes that were rectified with an earlier version of their camera, again.
   [[nodiscard]] std::vector<maps::StorePicture> corrected_pictures(const MapResult& map) const {
     std::vector<maps::StorePicture> pictures;
@@ -165,13 +182,13 @@ class StoreStage : public Stage {
   }
 
   /// Pictures of the stores that finished maps were read from.
-  [[nodiscard]] std::vector<maps::StorePicture> stored_pictures() const {
+  [[nodiscard]] std::vector<maps::StorePicture> stored_pictures(const MapResult& map) const {
     std::vector<maps::StorePicture> pictures;
     if (images_ == Images::kOff) return pictures;
     for (const maps::StoredCloud& cloud : context_->input.stored_maps->clouds()) {
       const maps::StoredViews& views = context_->input.stored_maps->views_of(cloud);
       const core::KeyframeId id = views.keyframes[cloud.view];
-      if (!id.valid()) continue;
+      if (!id.valid() || (map.revised != nullptr && map.revised->left_out.count({id, {}}) != 0)) continue;
       const core::KeyframeId stored = views.stored_keyframe(cloud.view);
       const auto small = views.reader->small_picture(stored);
       const auto whole = views.reader->whole_picture(stored);

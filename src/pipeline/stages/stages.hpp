@@ -37,6 +37,7 @@ StageType filter_stage();
 StageType store_stage();
 StageType maps_stage();
 StageType merge_stage();
+StageType visit_stage();
 StageType check_stage();
 StageType output_stage();
 

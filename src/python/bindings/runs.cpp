@@ -29,7 +29,8 @@ std::unique_ptr<Background> start_map(const std::vector<std::string>& inputs, co
                                       const std::string& format, double from_s, std::optional<double> to_s,
                                       int every, const std::string& poses,
                                       const std::map<std::string, std::string>& topics, int threads,
-                                      bool replace, bool resume, const fs::path& known_map) {
+                                      bool replace, bool resume, const fs::path& known_map,
+                                      const fs::path& into) {
   pipeline::MapRequest request;
   fill(request, output, pipeline, overrides, pipelines, replace);
   if (inputs.empty()) throw Failure({core::ErrorKind::kUsage, "inputs: name a recording"});
@@ -38,6 +39,7 @@ std::unique_ptr<Background> start_map(const std::vector<std::string>& inputs, co
   request.open = open_options(pipelines, camera, format, from_s, to_s, every, poses, topics);
   request.resume = resume;
   request.known_map = known_map;
+  request.into = into;
 
   return std::make_unique<Background>(
       [request, threads](core::Log& log, const core::StopToken& stop, const pipeline::Progress& progress) {
@@ -174,7 +176,8 @@ void add_runs(py::module_& module) {
   module.def("start_map", &start_map, py::arg("inputs"), py::arg("output"), py::arg("pipeline"),
              py::arg("overrides"), py::arg("pipelines"), py::arg("camera"), py::arg("format"),
              py::arg("from_s"), py::arg("to_s"), py::arg("every"), py::arg("poses"), py::arg("topics"),
-             py::arg("threads"), py::arg("replace"), py::arg("resume"), py::arg("known_map"));
+             py::arg("threads"), py::arg("replace"), py::arg("resume"), py::arg("known_map"),
+             py::arg("into"));
   module.def("start_fuse", &start_fuse, py::arg("maps"), py::arg("output"), py::arg("pipeline"),
              py::arg("overrides"), py::arg("pipelines"), py::arg("anchor"), py::arg("threads"),
              py::arg("replace"));

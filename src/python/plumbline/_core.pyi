@@ -140,6 +140,7 @@ def start_map(
     replace: bool,
     resume: bool,
     known_map: str,
+    into: str,
 ) -> Background: ...
 def start_fuse(
     maps: List[str],

@@ -71,11 +71,13 @@ def map(  # noqa: A001, the program's name for it
     threads: int = 0,
     force: bool = False,
     resume: bool = False,
+    into: Union[PathLike, Result, None] = None,
     progress: Optional[Progress] = None,
     **options: Any,
 ) -> Result:
     """Maps a recording, or several, one per robot, into a result folder: `plumbline map` as a call.
 
+    into      a finished map that this is another visit of, which stays as it is
     progress  called with the number of frames that are done and of all frames, in this thread
     threads   0: one per core; results do not depend on it
     options   of stages: track={"loops": False} or **{"fuse.voxel": "2 cm"}
@@ -83,9 +85,10 @@ def map(  # noqa: A001, the program's name for it
     The interpreter is free meanwhile: other threads run. Ctrl-C ends the run, which writes what it has; then
     KeyboardInterrupt is raised. Raises ConfigError, InputError, OutputError as the program's exit codes 2, 3, 5.
     """
+    earlier = "" if into is None else os.fspath(into.folder) if isinstance(into, Result) else path_of(into, "into")
     run = _core.start_map(
         _files(recording), path_of(output, "output"), path_of(pipeline, "pipeline"), overrides(options), pipelines(),
-        os.fspath(camera), format, start, end, every, poses, dict(topics or {}), threads, force, resume, "",
+        os.fspath(camera), format, start, end, every, poses, dict(topics or {}), threads, force, resume, "", earlier,
     )
     _finish(run, progress)
     return Result(output)
@@ -115,7 +118,7 @@ def localize(
     known = os.fspath(map.folder) if isinstance(map, Result) else path_of(map, "map")
     run = _core.start_map(
         _files(recording), path_of(output, "output"), path_of(pipeline, "pipeline"), overrides(options), pipelines(),
-        os.fspath(camera), format, start, end, every, "ignore", dict(topics or {}), threads, force, False, known,
+        os.fspath(camera), format, start, end, every, "ignore", dict(topics or {}), threads, force, False, known, "",
     )
     _finish(run, progress)
     return Localization(output)
