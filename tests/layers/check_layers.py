@@ -22,6 +22,7 @@ LAYERS = [
     ["mapping"],
     ["viz", "exports", "localize"],
     ["pipeline", "report"],
+    ["session"],
     ["net"],
     ["cli", "python"],
 ]
