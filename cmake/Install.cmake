@@ -1,17 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# What find_package(plumbline) finds: headers, plumbline::<module> for every module, and what they need.
-# Module.cmake installs the libraries, src/cli the program and the pipelines.
+# What find_package(plumbline) finds: plumbline::plumbline (src/session makes it) and the headers below, of which each needs
+# only Eigen, OpenCV's core, PCL and tl-expected; the others are between modules. tests/consumer compiles each alone.
 include(CMakePackageConfigHelpers)
 set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/plumbline)
 
-install(DIRECTORY include/plumbline DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev
-        FILES_MATCHING PATTERN "*.hpp")
-# Targets that are no modules but that modules bring along.
-set_target_properties(plumbline_pcl PROPERTIES EXPORT_NAME pcl)
-set_target_properties(plumbline_offscreen PROPERTIES EXPORT_NAME offscreen)
-install(TARGETS plumbline_pcl plumbline_offscreen EXPORT plumbline COMPONENT dev)
-install(EXPORT plumbline NAMESPACE plumbline:: DESTINATION ${package_folder} FILE plumblineTargets.cmake
-        COMPONENT dev)
+set(public_headers plumbline.hpp
+    session/map.hpp session/mapper.hpp session/options.hpp session/result.hpp pipeline/live_pose.hpp
+    cloud/types.hpp cloud/io/cloud_io.hpp cloud/io/frame.hpp cloud/io/mesh.hpp cloud/io/ply.hpp
+    cloud/filters/choosing_filter.hpp cloud/filters/filter.hpp cloud/filters/filter_plugin.hpp
+    cloud/filters/flying_pixels.hpp cloud/filters/incidence_angle.hpp cloud/filters/normal_consistency.hpp
+    core/config.hpp core/error.hpp core/executor.hpp core/ids.hpp core/log.hpp core/options.hpp core/stop.hpp core/version.hpp
+    geometry/rigid3.hpp geometry/trajectory.hpp sensor/camera.hpp sensor/depth_noise.hpp sensor/lens.hpp)
+foreach(header ${public_headers})
+  cmake_path(GET header PARENT_PATH folder)
+  install(FILES include/plumbline/${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/plumbline/${folder} COMPONENT dev)
+endforeach()
+install(EXPORT plumbline NAMESPACE plumbline:: DESTINATION ${package_folder} FILE plumblineTargets.cmake COMPONENT dev)
 
 set(program ${CMAKE_INSTALL_BINDIR}/plumbline)
 set(pipelines ${CMAKE_INSTALL_DATADIR}/plumbline/pipelines)

@@ -55,8 +55,8 @@ plumbline_package(net plumbline-net science "maps of robots over a network, for 
   "The part of plumbline that its commands hub and robot need: robots send their maps to a hub, which fuses them (CycloneDDS). Brings a systemd unit for the hub.")
 plumbline_package(ros1 plumbline-ros1 science "ROS bags, for plumbline"
   "The part of plumbline that reads ROS bags (ROS 1 .bag, ROS 2 .mcap and .db3) and writes MCAP files.")
-plumbline_package(dev libplumbline-dev libdevel "libraries and headers of plumbline"
-  "Static libraries, headers and the CMake package of plumbline: find_package(plumbline).")
+plumbline_package(dev libplumbline-dev libdevel "headers of plumbline's library"
+  "Headers and the CMake package of plumbline: find_package(plumbline). The library comes with the program.")
 plumbline_package(python python3-plumbline python "plumbline as a Python module"
   "Recordings, live mapping, results, filters, measures and pictures of plumbline, with numpy arrays.")
 plumbline_package(doc plumbline-doc doc "documentation of plumbline"
@@ -71,7 +71,7 @@ set(CPACK_DEBIAN_DEV_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_DOC_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_DOC_PACKAGE_ARCHITECTURE all)
 # What the public headers include and cmake/plumblineConfig.cmake.in finds; tests/packaging compares.
-set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "plumbline (${this_version}), libpcl-dev, libopencv-dev, libopencv-contrib-dev, libeigen3-dev, libceres-dev, libtbb-dev, libyaml-cpp-dev, libspdlog-dev, libfmt-dev, nlohmann-json3-dev, libexpected-dev, libembree-dev, robin-map-dev, libsqlitecpp-dev, libzstd-dev, liblz4-dev, libdeflate-dev, libjpeg-dev")
+set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "plumbline (${this_version}), libpcl-dev, libopencv-dev, libeigen3-dev, libexpected-dev")
 if(PLUMBLINE_PYTHON_VERSION MATCHES "^([0-9]+)\\.([0-9]+)") # the compiled part is for this one alone
   math(EXPR next_minor "${CMAKE_MATCH_2} + 1")
   string(APPEND CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS ", python3 (>= ${CMAKE_MATCH_1}.${CMAKE_MATCH_2}), python3 (<< ${CMAKE_MATCH_1}.${next_minor})")

@@ -16,9 +16,9 @@
 #include <utility>
 
 #include "empty_values.hpp"
-#include "paths.hpp"
 #include "plumbline/cloud/filters/filter_plugin.hpp"
 #include "plumbline/core/shortage.hpp"
+#include "plumbline/session/map.hpp"
 #include "terminal/help.hpp"
 #include "terminal/print.hpp"
 #include "terminal/signals.hpp"
@@ -76,7 +76,7 @@ int run_command(Session& session) {
 }  // namespace
 
 core::Result<std::filesystem::path> Session::pipelines_folder() const {
-  return find_pipelines_folder(pipelines_dir);
+  return find_pipelines(pipelines_dir);
 }
 
 core::Result<cloud::FilterRegistry> Session::filters() const {

@@ -46,6 +46,16 @@ std::vector<fs::path> library_folders() {
   return folders;
 }
 
+/// In a program of others that links this library, that program's libGLX would come before the stand-ins for
+/// it in the part "viz": parts and what they load then take their own symbols first. Sanitizers refuse that.
+int symbol_order() {
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  if (own_object() != dlopen(nullptr, RTLD_LAZY) && dlsym(RTLD_DEFAULT, "glXGetProcAddressARB") != nullptr)
+    return RTLD_DEEPBIND;
+#endif
+  return 0;
+}
+
 /// Parts of Debian packages of their own.
 std::string remedy(const std::string& name) {
   if (name == "dds") return "install the package plumbline-net";
@@ -75,7 +85,7 @@ Result<const void*> load_part(const std::string& name, std::uint64_t layout) {
                    fmt::format("{}: this part of Plumbline {}; install Plumbline again", path, why));
   };
 
-  void* handle = dlopen(path.c_str(), RTLD_LAZY | RTLD_LOCAL);
+  void* handle = dlopen(path.c_str(), RTLD_LAZY | RTLD_LOCAL | symbol_order());
   if (handle == nullptr) {
     const char* words = dlerror();
     const std::string why = words == nullptr ? "unknown reason" : words;

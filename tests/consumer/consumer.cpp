@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Thins a cloud with the installed filters, draws it off-screen, reads it back: consumer OUT-FOLDER
+// Thins a cloud with the installed filters, writes and reads it back: consumer OUT-FOLDER
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
@@ -7,10 +7,9 @@
 #include <filesystem>
 #include <memory>
 
-#include "plumbline/cloud/filters/filter_chain.hpp"
 #include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/core/version.hpp"
-#include "plumbline/viz/snapshot.hpp"
+#include "plumbline/plumbline.hpp"
 
 using namespace plumbline;
 
@@ -42,25 +41,12 @@ int fail(const core::Error& error) {
 int main(int argc, char** argv) {
   if (argc != 2) return 2;
   const std::filesystem::path out = argv[1];
-  core::ConfigProblems problems;
-  const auto yaml =
-      core::parse_yaml("chain: thin\nfilters:\n  - type: voxel_grid\n    leaf: 2 cm\n", "thin.yaml");
-  if (!yaml) return fail(yaml.error());
-  const auto chain = cloud::FilterChain::parse(*yaml, "", cloud::builtin_filters(), problems);
-  if (!problems.empty()) return fail(core::to_error(problems));
-  const auto thin = chain.apply(make_wall());
+  const auto thin = filter(make_wall(), "[{type: voxel_grid, leaf: 2 cm}]");
   if (!thin) return fail(thin.error());
   if (auto written = cloud::write_cloud(out / "thin.ply", **thin); !written) return fail(written.error());
   const auto back = cloud::read_cloud(out / "thin.ply");
   if (!back) return fail(back.error());
 
-  viz::Scene scene;
-  scene.cloud = back->cloud;
-  viz::SnapshotOptions options;
-  options.view = viz::View::kFront;
-  options.width_px = 320;
-  options.height_px = 240;
-  if (auto drawn = viz::render_snapshot(scene, options, out / "thin.png"); !drawn) return fail(drawn.error());
   std::printf("plumbline %s kept %zu of 40000 points\n", core::version(), back->cloud->size());
   return back->cloud->size() >= 2500 && back->cloud->size() < 3000 ? 0 : 1;
 }

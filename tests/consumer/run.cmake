@@ -12,13 +12,12 @@ run(${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR} -B ${WORK}/build -G Ninja
     -DCMAKE_PREFIX_PATH=${WORK}/prefix -DCMAKE_BUILD_TYPE=Debug "-DCMAKE_CXX_FLAGS=${FLAGS}")
 run(${CMAKE_COMMAND} --build ${WORK}/build)
 run(${WORK}/build/consumer ${WORK}/out)
-run(${WORK}/build/map_world ${WORK}/out/world ${WORK}/prefix/share/plumbline/pipelines)
 run(${WORK}/prefix/bin/plumbline pipelines check rgbd)
-# The example of a filter of one's own, built against the same installation and loaded by its program.
-run(${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR}/../../examples/plugin_filter -B ${WORK}/plugin -G Ninja
+# The examples, built against the same installation: they map, and a plugin is loaded by its program.
+run(${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR}/../../examples -B ${WORK}/examples -G Ninja
     -DCMAKE_PREFIX_PATH=${WORK}/prefix -DCMAKE_BUILD_TYPE=Debug "-DCMAKE_CXX_FLAGS=${FLAGS}")
-run(${CMAKE_COMMAND} --build ${WORK}/plugin)
-run(${CMAKE_CTEST_COMMAND} --test-dir ${WORK}/plugin --output-on-failure --no-tests=error)
+run(${CMAKE_COMMAND} --build ${WORK}/examples)
+run(${CMAKE_CTEST_COMMAND} --test-dir ${WORK}/examples --output-on-failure --no-tests=error)
 # The installed program draws wherever the whole is put, and tells when one of its parts is missing.
 file(RENAME ${WORK}/prefix ${WORK}/moved)
 set(draw ${WORK}/moved/bin/plumbline render ${WORK}/out/thin.ply -o ${WORK}/out/moved.png --size 320x240)

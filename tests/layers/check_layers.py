@@ -23,6 +23,7 @@ LAYERS = [
     ["viz", "exports", "localize"],
     ["changes"],
     ["pipeline", "report"],
+    ["session"],
     ["net"],
     ["cli", "python"],
 ]

@@ -11,16 +11,15 @@
 #include "plumbline/core/config.hpp"
 #include "plumbline/core/text.hpp"
 #include "plumbline/dataset/jpeg.hpp"
+#include "plumbline/exports/recordings.hpp"
 
 namespace plumbline::exports {
-namespace {
 
-/// Recordings from which the map in `folder` was made, by robot; empty if the map was fused from other maps.
 std::vector<RecordingName> recordings_of_run(const std::string& configuration,
                                              const std::filesystem::path& folder) {
   const auto root = core::parse_yaml(configuration, "configuration");
   const core::ConfigNode* run = root ? root->find("run") : nullptr;
-  if (run == nullptr) return {};
+  if (run == nullptr || run->find("fed") != nullptr) return {};
   const auto text = [&](const std::string& key) {
     const core::ConfigNode* node = run->find(key);
     return node != nullptr ? node->scalar : std::string();
@@ -40,6 +39,8 @@ std::vector<RecordingName> recordings_of_run(const std::string& configuration,
     names.push_back({found(input), found(text("camera")), text("format")});
   }
 }
+
+namespace {
 
 core::Result<std::vector<RecordingName>> recordings_of(const MapSource& source,
                                                        const maps::StoredRun& store) {

@@ -2,6 +2,7 @@
 #include "bindings.hpp"
 #include "plumbline/sensor/camera.hpp"
 #include "plumbline/sensor/camera_file.hpp"
+#include "plumbline/session/map.hpp"
 
 namespace plumbline::python {
 namespace {
@@ -16,15 +17,6 @@ sensor::Camera make_camera(int width, int height, double fx, double fy, double c
   const std::string problem = sensor::camera_problem(camera);
   if (!problem.empty()) throw Failure({core::ErrorKind::kUsage, "camera: " + problem});
   return camera;
-}
-
-sensor::Camera find_camera(const std::string& name_or_file, const std::filesystem::path& cameras) {
-  sensor::CameraReading reading = value_of(sensor::find_camera(name_or_file, cameras));
-  if (!reading.has_size) {
-    throw Failure({core::ErrorKind::kUsage,
-                   name_or_file + ": the file does not tell the size of the images; write a camera.yaml"});
-  }
-  return reading.camera;
 }
 
 py::array_t<double> intrinsics(const sensor::Camera& camera) {
@@ -43,7 +35,9 @@ void add_cameras(py::module_& module) {
       .def(py::init(&make_camera), py::arg("width"), py::arg("height"), py::arg("fx"), py::arg("fy"),
            py::arg("cx"), py::arg("cy"), py::kw_only(), py::arg("depth_scale") = 5000.0,
            py::arg("fps") = 30.0)
-      .def_static("_find", &find_camera, py::arg("name_or_file"), py::arg("cameras"))
+      .def_static(
+          "_find", [](const std::string& name) { return value_of(plumbline::find_camera(name)); },
+          py::arg("name_or_file"))
 
       .def_static(
           "from_yaml",

@@ -7,13 +7,12 @@
 #include <cstddef>
 #include <limits>
 
-#include "background.hpp"
 #include "bindings.hpp"
-#include "plumbline/cloud/filters/filter_chain.hpp"
 #include "plumbline/cloud/io/cloud_io.hpp"
-#include "plumbline/core/config.hpp"
 #include "plumbline/core/executor.hpp"
 #include "plumbline/maps/result_folder.hpp"
+#include "plumbline/session/background.hpp"
+#include "plumbline/session/filter_chains.hpp"
 
 namespace plumbline::python {
 namespace {
@@ -157,30 +156,16 @@ void write_cloud(const PointCloudPtr& self, const std::filesystem::path& file) {
   value_of(cloud::write_cloud(file, *self->cloud, self->columns, self->shift, self->frame.comments()));
 }
 
-/// A chain's file or name, or, with `yaml`, the text of one.
-cloud::FilterChain load_chain(const std::string& chain, bool yaml, const std::filesystem::path& folder) {
-  const cloud::FilterRegistry registry = cloud::builtin_filters();
-  if (!yaml)
-    return value_of(
-        cloud::FilterChain::load(value_of(core::find_yaml("filter chain", chain, folder)), registry));
-  const core::ConfigNode list = value_of(core::parse_yaml(chain, "filters"));
-  core::ConfigProblems problems;
-  cloud::FilterChain parsed = cloud::FilterChain::parse_list(list, "filters", registry, problems);
-  if (!problems.empty()) throw Failure(core::to_error(problems));
-  return parsed;
-}
-
 /// The filtered cloud, and for each filter: type, numbers of points before and after.
-py::tuple filter(const PointCloudPtr& self, const std::string& chain, bool yaml,
-                 const std::filesystem::path& folder, int threads) {
+py::tuple filter(const PointCloudPtr& self, const std::string& chain, int threads) {
   auto result = std::make_shared<PointCloud>();
   std::vector<cloud::FilterReport> reports;
 
   {
     const py::gil_scoped_release free;
-    const OpenCvThreads one;
+    const session::OpenCvThreads one;
     const core::Executor executor(threads);
-    const cloud::FilterChain loaded = load_chain(chain, yaml, folder);
+    const cloud::FilterChain loaded = value_of(session::load_chain(chain, cloud::builtin_filters()));
     cloud::CloudColumns made = self->columns;
     cloud::FilterContext context;
 
@@ -212,7 +197,7 @@ void add_clouds(py::module_& module) {
            py::arg("columns"))
       .def_static("read", &read_cloud, py::arg("file"))
       .def("write", &write_cloud, py::arg("file"))
-      .def("filter", &filter, py::arg("chain"), py::arg("yaml"), py::arg("folder"), py::arg("threads"))
+      .def("filter", &filter, py::arg("chain"), py::arg("threads"))
       .def("__len__", [](const PointCloud& c) { return c.cloud->size(); })
 
       .def_property_readonly(

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "background.hpp"
 #include "bindings.hpp"
 #include "plumbline/core/config.hpp"
 #include "plumbline/core/json.hpp"

@@ -3,7 +3,6 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
-#include "background.hpp"
 #include "bindings.hpp"
 #include "option_values.hpp"
 #include "plumbline/changes/compare.hpp"
@@ -14,7 +13,9 @@
 #include "plumbline/exports/export.hpp"
 #include "plumbline/maps/stored_run.hpp"
 #include "plumbline/pipeline/input.hpp"
+#include "plumbline/session/map.hpp"
 #include "plumbline/viz/snapshot.hpp"
+#include "watch.hpp"
 
 namespace plumbline::python {
 namespace {
@@ -85,8 +86,7 @@ py::tuple evaluate_cloud(const Doubles& points, const std::array<double, 3>& shi
 
 /// Files that were written, and notes.
 py::tuple write_export(const fs::path& input, const fs::path& output, const std::string& format,
-                       const std::string& what, const OptionValues& values, const fs::path& pipelines,
-                       bool replace, int threads) {
+                       const std::string& what, const OptionValues& values, bool replace, int threads) {
   exports::ExportRequest request;
   request.input = input;
   request.output = output;
@@ -103,7 +103,9 @@ py::tuple write_export(const fs::path& input, const fs::path& output, const std:
 
   const py::gil_scoped_release free;
   const core::Executor executor(threads);
-  QueueLog log;
+  Watch log;
+  const fs::path pipelines = value_of(find_pipelines());
+
   request.open = [&](const exports::RecordingName& name) {
     dataset::OpenOptions open;
     open.camera = name.camera;
@@ -182,8 +184,7 @@ void add_measures(py::module_& module) {
   module.def("evaluate_cloud", &evaluate_cloud, py::arg("points"), py::arg("shift"), py::arg("normals"),
              py::arg("reference"), py::arg("paths"), py::arg("options"), py::arg("threads"));
   module.def("write_export", &write_export, py::arg("input"), py::arg("output"), py::arg("format"),
-             py::arg("what"), py::arg("options"), py::arg("pipelines"), py::arg("replace"),
-             py::arg("threads"));
+             py::arg("what"), py::arg("options"), py::arg("replace"), py::arg("threads"));
   module.def("compare", &compare, py::arg("before"), py::arg("after"), py::arg("output"), py::arg("given_order"),
              py::arg("options"), py::arg("replace"), py::arg("threads"));
   module.def("render", &render, py::arg("input"), py::arg("title"), py::arg("lines"), py::arg("options"),

@@ -41,7 +41,6 @@ PYBIND11_MODULE(_core, module) {
 
   module.attr("version") = core::version();
   module.attr("store_format") = maps::kStoreFormat;
-  module.attr("source_pipelines") = PLUMBLINE_SOURCE_PIPELINES;
   python::add_errors(module);
   python::add_cameras(module);
   python::add_recordings(module);

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <memory>
-#include <mutex>
-#include <optional>
 
-#include "background.hpp"
 #include "bindings.hpp"
 #include "plumbline/core/executor.hpp"
 #include "plumbline/dataset/live_frames.hpp"
 #include "plumbline/pipeline/input.hpp"
+#include "plumbline/session/background.hpp"
+#include "plumbline/session/map.hpp"
+#include "watch.hpp"
 
 namespace plumbline::python {
 namespace {
@@ -15,11 +15,11 @@ namespace {
 /// An open recording with what it needs to read.
 class Recording {
  public:
-  Recording(const std::string& input, const dataset::OpenOptions& options,
-            const std::filesystem::path& scenes, int threads)
-      : executor_(threads) {
-    const OpenCvThreads one;
-    source_ = value_of(pipeline::open_input(input, options, scenes, executor_, log_));
+  Recording(const std::string& input, const RecordingOptions& options, int threads) : executor_(threads) {
+    const session::OpenCvThreads one;
+    const std::filesystem::path pipelines = value_of(find_pipelines());
+    source_ = value_of(pipeline::open_input(input, value_of(session::open_options(options, pipelines)),
+                                            pipelines / "scenes", executor_, log_));
   }
 
   [[nodiscard]] const dataset::FrameSource& source() const { return *source_; }
@@ -27,7 +27,7 @@ class Recording {
   std::vector<LogLine> messages() { return log_.take(); }
 
  private:
-  QueueLog log_;
+  Watch log_;
   core::Executor executor_;
   std::unique_ptr<dataset::FrameSource> source_;
 };
@@ -66,49 +66,12 @@ py::array_t<double> stamps(const Recording& recording) {
   return owned(std::move(all), {count});
 }
 
-std::unique_ptr<Recording> open(const std::string& input, const std::filesystem::path& pipelines,
-                                const std::string& camera, const std::string& format, double from_s,
-                                std::optional<double> to_s, int every, const std::string& poses, int threads,
-                                const std::map<std::string, std::string>& topics) {
-  const dataset::OpenOptions options =
-      open_options(pipelines, camera, format, from_s, to_s, every, poses, topics);
+std::unique_ptr<Recording> open(const std::string& input, const RecordingOptions& options, int threads) {
   const py::gil_scoped_release free;
-  return std::make_unique<Recording>(input, options, pipelines / "scenes", threads);
+  return std::make_unique<Recording>(input, options, threads);
 }
 
 }  // namespace
-
-dataset::OpenOptions open_options(const std::filesystem::path& pipelines, const std::string& camera,
-                                  const std::string& format, double from_s, std::optional<double> to_s,
-                                  int every, const std::string& poses,
-                                  const std::map<std::string, std::string>& topics) {
-  dataset::OpenOptions options;
-  options.format = format;
-  options.camera = camera;
-
-  options.cameras_folder = pipelines / "cameras";
-  options.from_s = from_s;
-  if (to_s) options.to_s = *to_s;
-  options.every = every;
-  options.poses = poses == "given"    ? dataset::PoseUse::kGiven
-                  : poses == "ignore" ? dataset::PoseUse::kIgnore
-                                      : dataset::PoseUse::kPrior;
-
-  for (const auto& [what, topic] : topics) {
-    std::string* name = what == "color"        ? &options.topics.color
-                        : what == "depth"      ? &options.topics.depth
-                        : what == "info"       ? &options.topics.info
-                        : what == "depth_info" ? &options.topics.depth_info
-                                               : nullptr;
-
-    if (name == nullptr) {
-      throw Failure({core::ErrorKind::kUsage,
-                     "topics: there is no '" + what + "' (allowed: color, depth, info, depth_info)"});
-    }
-    *name = topic;
-  }
-  return options;
-}
 
 void add_recordings(py::module_& module) {
   py::class_<Recording>(module, "Recording")
@@ -124,9 +87,7 @@ void add_recordings(py::module_& module) {
         const auto truth = r.source().truth();
         return truth ? py::object(arrays_of(*truth)) : py::object(py::none());
       });
-  module.def("open", &open, py::arg("input"), py::arg("pipelines"), py::arg("camera"), py::arg("format"),
-             py::arg("from_s"), py::arg("to_s"), py::arg("every"), py::arg("poses"), py::arg("threads"),
-             py::arg("topics"));
+  module.def("open", &open, py::arg("input"), py::arg("options"), py::arg("threads"));
 }
 
 }  // namespace plumbline::python

@@ -1,128 +1,78 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // map, fuse, and the mapper that frames are fed to.
-#include <chrono>
+#include <memory>
 
-#include "background.hpp"
 #include "bindings.hpp"
-#include "plumbline/core/executor.hpp"
-#include "plumbline/dataset/live_frames.hpp"
-#include "plumbline/pipeline/fuse_maps.hpp"
-#include "plumbline/pipeline/observer.hpp"
+#include "plumbline/session/background.hpp"
+#include "plumbline/session/mapper.hpp"
+#include "watch.hpp"
 
 namespace plumbline::python {
 namespace {
 
 namespace fs = std::filesystem;
+using Seconds = double;
 
-void fill(pipeline::RunRequest& request, const fs::path& output, const std::string& pipeline,
-          const std::vector<std::string>& overrides, const fs::path& pipelines, bool replace) {
-  request.output = output;
-  request.pipeline = pipeline;
-  request.overrides = overrides;
-  request.pipelines_folder = pipelines;
-  request.replace = replace;
+/// The options' messages and progress go to a new Watch.
+std::shared_ptr<Watch> watched(RunOptions& options) {
+  auto watch = std::make_shared<Watch>();
+  options.log = watch;
+  options.progress = [shown = watch.get()](std::size_t frames, std::size_t total) {
+    shown->frames = frames;
+    shown->total = total;
+  };
+  return watch;
 }
 
-std::unique_ptr<Background> start_map(const std::vector<std::string>& inputs, const fs::path& output,
-                                      const std::string& pipeline, const std::vector<std::string>& overrides,
-                                      const fs::path& pipelines, const std::string& camera,
-                                      const std::string& format, double from_s, std::optional<double> to_s,
-                                      int every, const std::string& poses,
-                                      const std::map<std::string, std::string>& topics, int threads,
-                                      bool replace, bool resume, const fs::path& known_map,
-                                      const fs::path& into) {
-  pipeline::MapRequest request;
-  fill(request, output, pipeline, overrides, pipelines, replace);
-  if (inputs.empty()) throw Failure({core::ErrorKind::kUsage, "inputs: name a recording"});
-  request.input = inputs.front();
-  request.others.assign(inputs.begin() + 1, inputs.end());
-  request.open = open_options(pipelines, camera, format, from_s, to_s, every, poses, topics);
-  request.resume = resume;
-  request.known_map = known_map;
-  request.into = into;
-
-  return std::make_unique<Background>(
-      [request, threads](core::Log& log, const core::StopToken& stop, const pipeline::Progress& progress) {
-        const core::Executor executor(threads);
-        return pipeline::map_recording(request, executor, log, stop, progress);
-      });
-}
-
-std::unique_ptr<Background> start_fuse(const std::vector<fs::path>& maps, const fs::path& output,
-                                       const std::string& pipeline, const std::vector<std::string>& overrides,
-                                       const fs::path& pipelines, const std::string& anchor, int threads,
-                                       bool replace) {
-  pipeline::FuseRequest request;
-  fill(request, output, pipeline, overrides, pipelines, replace);
-  request.maps = maps;
-  request.anchor = anchor;
-  return std::make_unique<Background>(
-      [request, threads](core::Log& log, const core::StopToken& stop, const pipeline::Progress& progress) {
-        const core::Executor executor(threads);
-        return pipeline::fuse_stored_maps(request, executor, log, stop, progress);
-      });
-}
-
-/// Collects the tracker's poses for waiting callers.
-class Poses : public pipeline::RunObserver {
+/// A run in the background.
+class Run {
  public:
-  void processed(const pipeline::LivePose& pose) override {
-    const std::lock_guard lock(mutex_);
-    poses_.push_back(pose);
-    changed_.notify_all();
+  template <typename Options, typename Work>
+  Run(Options options, const Work& work) : watch(watched(options)), stop(options.stop) {
+    run_ = std::make_unique<session::Background>(stop, [options, work] { return work(options); });
+  }
+  ~Run() {
+    const py::gil_scoped_release free;
+    run_.reset();
   }
 
-  /// None if the pose has not come within so many seconds.
-  std::optional<pipeline::LivePose> get(std::size_t index, double seconds) {
-    std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, std::chrono::duration<double>(seconds), [&] { return index < poses_.size(); });
-    return index < poses_.size() ? std::optional(poses_[index]) : std::nullopt;
-  }
+  [[nodiscard]] bool done() const { return run_->done(); }
+  bool wait(Seconds most) { return run_->wait(most); }
+  std::string reason() { return value_of(run_->result()).reason; }
+
+  std::shared_ptr<Watch> watch;
+  core::StopToken stop;
 
  private:
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::vector<pipeline::LivePose> poses_;
+  std::unique_ptr<session::Background> run_;
 };
 
 /// A run whose frames are fed.
 class MapperRun {
  public:
-  MapperRun(const sensor::Camera& camera, const fs::path& output, const std::string& pipeline,
-            const std::vector<std::string>& overrides, const fs::path& pipelines, const std::string& name,
-            int threads, bool replace)
-      : live_(std::make_shared<dataset::LiveFrames>(camera, dataset::LiveFramesOptions{name})),
-        poses_(std::make_shared<Poses>()) {
-    pipeline::MapRequest request;
-    fill(request, output, pipeline, overrides, pipelines, replace);
-    request.input = name;
-    request.live = live_;
-    request.observer = poses_;
-    run_ = std::make_unique<Background>(
-        [request, threads](core::Log& log, const core::StopToken& stop, const pipeline::Progress& progress) {
-          const core::Executor executor(threads);
-          return pipeline::map_recording(request, executor, log, stop, progress);
-        });
+  MapperRun(const sensor::Camera& camera, const fs::path& output, MapperOptions options)
+      : watch(watched(options)),
+        stop(options.stop),
+        mapper_(std::make_unique<Mapper>(value_of(Mapper::start(camera, output, options)))) {}
+  ~MapperRun() {
+    const py::gil_scoped_release free;
+    mapper_.reset();
   }
-
-  ~MapperRun() { live_->abandon(); }
 
   /// The frame's number.
   std::size_t push(double stamp, std::optional<double> depth_stamp, const py::array& color,
                    const py::array& depth, const py::object& odometry) {
-    dataset::LiveFrame frame{stamp, depth_stamp, color_of(color, "color"), depth_of(depth, "depth"),
-                             std::nullopt};
+    Frame frame{stamp, depth_stamp, color_of(color, "color"), depth_of(depth, "depth"), std::nullopt};
     if (!odometry.is_none()) frame.odometry = pose_of(py::array(odometry), "odometry");
     const py::gil_scoped_release free;
-    value_of(live_->push(frame));
-    return fed_++;
+    return value_of(mapper_->push(frame)).value();
   }
 
   /// state, pose or None, whether it is a keyframe; None: not yet.
-  py::object pose(std::size_t index, double seconds) {
+  py::object pose(std::size_t index, Seconds most) {
     const auto pose = [&] {
       const py::gil_scoped_release free;
-      return poses_->get(index, seconds);
+      return mapper_->pose(index, most);
     }();
     if (!pose) return py::none();
     py::object matrix = py::none();
@@ -130,57 +80,103 @@ class MapperRun {
     return py::make_tuple(pose->state, matrix, pose->keyframe.valid());
   }
 
-  [[nodiscard]] bool wait_for_room(std::size_t most, double seconds) const {
-    const py::gil_scoped_release free;
-    return live_->wait_for_room(most, seconds);
-  }
+  [[nodiscard]] bool wait_for_room(Seconds most) const { return mapper_->wait_for_room(most); }
+  [[nodiscard]] std::size_t waiting() const { return mapper_->waiting(); }
+  void close() { mapper_->close(); }
+  void abandon() { mapper_->cancel(); }
+  [[nodiscard]] bool done() const { return mapper_->wait(0.0); }
+  bool wait(Seconds most) { return mapper_->wait(most); }
+  std::string reason() { return value_of(mapper_->finish()).verdict().reason; }
 
-  [[nodiscard]] std::size_t waiting() const { return live_->waiting(); }
-  void close() const { live_->close(); }
-  void abandon() const { live_->abandon(); }
-  [[nodiscard]] Background& run() { return *run_; }
+  std::shared_ptr<Watch> watch;
+  core::StopToken stop;
 
  private:
-  std::shared_ptr<dataset::LiveFrames> live_;
-  std::shared_ptr<Poses> poses_;
-  std::size_t fed_ = 0;
-  std::unique_ptr<Background> run_;  ///< last: ends before the rest does
+  std::unique_ptr<Mapper> mapper_;
 };
+
+std::unique_ptr<Run> start_map(const std::string& input, const fs::path& output, const MapOptions& options) {
+  return std::make_unique<Run>(options,
+                               [=](const MapOptions& own) { return session::run_map(input, output, own); });
+}
+
+std::unique_ptr<Run> start_fuse(const std::vector<fs::path>& maps, const fs::path& output,
+                                const FuseOptions& options) {
+  return std::make_unique<Run>(options,
+                               [=](const FuseOptions& own) { return session::run_fuse(maps, output, own); });
+}
+
+/// Calls of the thread that waits for a run.
+template <typename Class>
+void add_waiting(py::class_<Class>& run) {
+  const py::call_guard<py::gil_scoped_release> free;
+  run.def_property_readonly("done", &Class::done)
+      .def_property_readonly(
+          "progress",
+          [](const Class& r) { return std::make_tuple(r.watch->frames.load(), r.watch->total.load()); })
+      .def("request_stop", [](const Class& r) { r.stop.request_stop(); })
+      .def("messages", [](const Class& r) { return r.watch->take(); })
+      .def("wait", &Class::wait, free, py::arg("seconds"))
+      .def("reason", &Class::reason, free);
+}
+
+void add_options(py::module_& module) {
+  py::class_<RunOptions>(module, "RunOptions")
+      .def_readwrite("pipeline", &RunOptions::pipeline)
+      .def_readwrite("set", &RunOptions::set)
+      .def_readwrite("replace", &RunOptions::replace)
+      .def_readwrite("threads", &RunOptions::threads);
+
+  py::class_<RecordingOptions>(module, "RecordingOptions")
+      .def(py::init<>())
+      .def_readwrite("camera", &RecordingOptions::camera)
+      .def_readwrite("format", &RecordingOptions::format)
+      .def_readwrite("from_s", &RecordingOptions::from_s)
+      .def_readwrite("to_s", &RecordingOptions::to_s)
+      .def_readwrite("every", &RecordingOptions::every)
+      .def_readwrite("poses", &RecordingOptions::poses)
+      .def_readwrite("topics", &RecordingOptions::topics);
+
+  py::class_<MapOptions, RunOptions, RecordingOptions>(module, "MapOptions")
+      .def(py::init<>())
+      .def_readwrite("others", &MapOptions::others)
+      .def_readwrite("resume", &MapOptions::resume)
+      .def_readwrite("known_map", &MapOptions::known_map)
+      .def_readwrite("into", &MapOptions::into);
+
+  py::class_<FuseOptions, RunOptions>(module, "FuseOptions")
+      .def(py::init<>())
+      .def_readwrite("anchor", &FuseOptions::anchor);
+  py::class_<MapperOptions, RunOptions>(module, "MapperOptions")
+      .def(py::init<>())
+      .def_readwrite("name", &MapperOptions::name)
+      .def_readwrite("queue", &MapperOptions::queue);
+}
 
 }  // namespace
 
 void add_runs(py::module_& module) {
-  py::class_<Background>(module, "Background")
-      .def_property_readonly("done", &Background::done)
-      .def_property_readonly("progress", &Background::progress)
-      .def("request_stop", &Background::request_stop)
-      .def("messages", &Background::messages)
-      .def("wait", &Background::wait, py::arg("seconds"))
-      .def("reason", &Background::reason);
+  add_options(module);
+  py::class_<Run> run(module, "Run");
+  add_waiting(run);
+  py::class_<MapperRun> mapper(module, "MapperRun");
+  add_waiting(mapper);
 
-  py::class_<MapperRun>(module, "MapperRun")
-      .def(py::init<const sensor::Camera&, const fs::path&, const std::string&,
-                    const std::vector<std::string>&, const fs::path&, const std::string&, int, bool>(),
-           py::arg("camera"), py::arg("output"), py::arg("pipeline"), py::arg("overrides"),
-           py::arg("pipelines"), py::arg("name"), py::arg("threads"), py::arg("replace"))
+  mapper
+      .def(py::init<const sensor::Camera&, const fs::path&, const MapperOptions&>(), py::arg("camera"),
+           py::arg("output"), py::arg("options"))
       .def("push", &MapperRun::push, py::arg("stamp"), py::arg("depth_stamp"), py::arg("color"),
            py::arg("depth"), py::arg("odometry"))
 
       .def("pose", &MapperRun::pose, py::arg("index"), py::arg("seconds"))
-      .def("wait_for_room", &MapperRun::wait_for_room, py::arg("most"), py::arg("seconds"))
+      .def("wait_for_room", &MapperRun::wait_for_room, py::call_guard<py::gil_scoped_release>(),
+           py::arg("seconds"))
       .def_property_readonly("waiting", &MapperRun::waiting)
       .def("close", &MapperRun::close)
-      .def("abandon", &MapperRun::abandon)
-      .def_property_readonly("run", &MapperRun::run, py::return_value_policy::reference_internal);
+      .def("abandon", &MapperRun::abandon);
 
-  module.def("start_map", &start_map, py::arg("inputs"), py::arg("output"), py::arg("pipeline"),
-             py::arg("overrides"), py::arg("pipelines"), py::arg("camera"), py::arg("format"),
-             py::arg("from_s"), py::arg("to_s"), py::arg("every"), py::arg("poses"), py::arg("topics"),
-             py::arg("threads"), py::arg("replace"), py::arg("resume"), py::arg("known_map"),
-             py::arg("into"));
-  module.def("start_fuse", &start_fuse, py::arg("maps"), py::arg("output"), py::arg("pipeline"),
-             py::arg("overrides"), py::arg("pipelines"), py::arg("anchor"), py::arg("threads"),
-             py::arg("replace"));
+  module.def("start_map", &start_map, py::arg("input"), py::arg("output"), py::arg("options"));
+  module.def("start_fuse", &start_fuse, py::arg("maps"), py::arg("output"), py::arg("options"));
 }
 
 }  // namespace plumbline::python

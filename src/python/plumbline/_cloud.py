@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._paths import pipelines
 from ._values import PathLike, nested, path_of
 
 
@@ -140,8 +139,8 @@ def filter(  # noqa: A001, the program's name for it
     Raises ConfigError with every mistake of the chain. What each filter did is in `.reports`.
     """
     if isinstance(chain, str) or hasattr(chain, "__fspath__"):
-        text, is_yaml = path_of(chain, "chain"), False
+        text = path_of(chain, "chain")
     else:
-        text, is_yaml = nested(list(chain)), True
-    result, reports = cloud_of(cloud)._core.filter(text, is_yaml, pipelines() / "filters", threads)
+        text = nested(list(chain))
+    result, reports = cloud_of(cloud)._core.filter(text, threads)
     return Cloud(result, [FilterReport(*report) for report in reports])

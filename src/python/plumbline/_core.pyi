@@ -8,7 +8,6 @@ import numpy.typing as npt
 
 version: str
 store_format: int
-source_pipelines: str
 
 class Error(Exception): ...
 class InternalError(Error): ...
@@ -35,7 +34,7 @@ class Camera:
     @staticmethod
     def from_yaml(text: str) -> Camera: ...
     @staticmethod
-    def _find(name_or_file: str, cameras: Path) -> Camera: ...
+    def _find(name_or_file: str) -> Camera: ...
     def to_yaml(self) -> str: ...
     @property
     def name(self) -> str: ...
@@ -76,20 +75,39 @@ class Recording:
     @property
     def truth(self) -> Optional[Tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]]: ...
 
-def open(
-    input: str,
-    pipelines: Path,
-    camera: str,
-    format: str,
-    from_s: float,
-    to_s: Optional[float],
-    every: int,
-    poses: str,
-    threads: int,
-    topics: Dict[str, str],
-) -> Recording: ...
+class RunOptions:
+    pipeline: str
+    set: List[str]
+    replace: bool
+    threads: int
 
-class Background:
+class RecordingOptions:
+    camera: str
+    format: str
+    from_s: float
+    to_s: Optional[float]
+    every: int
+    poses: str
+    topics: Dict[str, str]
+    def __init__(self) -> None: ...
+
+class MapOptions(RunOptions, RecordingOptions):
+    others: List[str]
+    resume: bool
+    known_map: str
+    into: str
+    def __init__(self) -> None: ...
+
+class FuseOptions(RunOptions):
+    anchor: str
+    def __init__(self) -> None: ...
+
+class MapperOptions(RunOptions):
+    name: str
+    queue: int
+    def __init__(self) -> None: ...
+
+class Run:
     @property
     def done(self) -> bool: ...
     @property
@@ -100,58 +118,28 @@ class Background:
     def reason(self) -> str: ...
 
 class MapperRun:
-    def __init__(
-        self,
-        camera: Camera,
-        output: Path,
-        pipeline: str,
-        overrides: List[str],
-        pipelines: Path,
-        name: str,
-        threads: int,
-        replace: bool,
-    ) -> None: ...
+    def __init__(self, camera: Camera, output: Path, options: MapperOptions) -> None: ...
+    @property
+    def done(self) -> bool: ...
+    @property
+    def progress(self) -> Tuple[int, int]: ...
+    def request_stop(self) -> None: ...
+    def messages(self) -> List[Tuple[str, str]]: ...
+    def wait(self, seconds: float) -> bool: ...
+    def reason(self) -> str: ...
     def push(
         self, stamp: float, depth_stamp: Optional[float], color: npt.NDArray[Any], depth: npt.NDArray[Any], odometry: Any
     ) -> int: ...
     def pose(self, index: int, seconds: float) -> Any: ...
-    def wait_for_room(self, most: int, seconds: float) -> bool: ...
+    def wait_for_room(self, seconds: float) -> bool: ...
     def close(self) -> None: ...
     def abandon(self) -> None: ...
     @property
     def waiting(self) -> int: ...
-    @property
-    def run(self) -> Background: ...
 
-def start_map(
-    inputs: List[str],
-    output: str,
-    pipeline: str,
-    overrides: List[str],
-    pipelines: Path,
-    camera: str,
-    format: str,
-    from_s: float,
-    to_s: Optional[float],
-    every: int,
-    poses: str,
-    topics: Dict[str, str],
-    threads: int,
-    replace: bool,
-    resume: bool,
-    known_map: str,
-    into: str,
-) -> Background: ...
-def start_fuse(
-    maps: List[str],
-    output: str,
-    pipeline: str,
-    overrides: List[str],
-    pipelines: Path,
-    anchor: str,
-    threads: int,
-    replace: bool,
-) -> Background: ...
+def open(input: str, options: RecordingOptions, threads: int) -> Recording: ...
+def start_map(input: str, output: str, options: MapOptions) -> Run: ...
+def start_fuse(maps: List[str], output: str, options: FuseOptions) -> Run: ...
 
 class PointCloud:
     def __init__(
@@ -164,9 +152,7 @@ class PointCloud:
     @staticmethod
     def read(file: str) -> PointCloud: ...
     def write(self, file: str) -> None: ...
-    def filter(
-        self, chain: str, yaml: bool, folder: Path, threads: int
-    ) -> Tuple[PointCloud, List[Tuple[str, int, int]]]: ...
+    def filter(self, chain: str, threads: int) -> Tuple[PointCloud, List[Tuple[str, int, int]]]: ...
     def __len__(self) -> int: ...
     @property
     def points(self) -> npt.NDArray[np.float32]: ...
@@ -217,7 +203,6 @@ def write_export(
     format: str,
     what: str,
     options: Dict[str, str],
-    pipelines: Path,
     replace: bool,
     threads: int,
 ) -> Tuple[List[Path], List[str]]: ...

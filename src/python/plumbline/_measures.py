@@ -16,7 +16,6 @@ import numpy.typing as npt
 
 from . import _core
 from ._cloud import Cloud, CloudLike, cloud_of
-from ._paths import pipelines
 from ._result import Result
 from ._trajectory import TrajectoryLike, trajectory_of
 from ._values import PathLike, option_texts, path_of, tell
@@ -147,7 +146,7 @@ def export(
     options  of the format: voxel="1 cm", resolution="5 cm", box=[0, 0, 0, 2, 2, 2] ...
     """
     written, notes = _core.write_export(
-        _path(map), path_of(output, "output"), format, what, option_texts(options), pipelines(), force, threads
+        _path(map), path_of(output, "output"), format, what, option_texts(options), force, threads
     )
     tell(("INFO", note) for note in notes)
     return [Path(file) for file in written]

@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 import warnings
 from dataclasses import dataclass
-from typing import Iterator, Mapping, Optional, Union
+from typing import Iterator, Mapping, Optional, TypeVar, Union
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _core
 from ._core import Camera
-from ._paths import pipelines
 from ._trajectory import Trajectory
 from ._values import PathLike, path_of, tell
 
@@ -22,7 +21,20 @@ def camera(name_or_file: PathLike) -> Camera:
 
     Raises ConfigError: no such camera, or not one, with the place in the file.
     """
-    return Camera._find(path_of(name_or_file, "name_or_file"), pipelines() / "cameras")
+    return Camera._find(path_of(name_or_file, "name_or_file"))
+
+
+Options = TypeVar("Options", bound=_core.RecordingOptions)
+
+
+def reading(
+    options: Options, camera: PathLike, format: str, start: float, end: Optional[float], every: int,  # noqa: A002
+    poses: str, topics: Optional[Mapping[str, str]],
+) -> Options:
+    """`options` with the arguments that all calls share which read a recording."""
+    options.camera, options.format, options.every = os.fspath(camera), format, every
+    options.from_s, options.to_s, options.poses, options.topics = start, end, poses, dict(topics or {})
+    return options
 
 
 @dataclass(frozen=True)
@@ -136,9 +148,7 @@ def open(  # noqa: A001, as in gzip.open
 
     Raises InputError (not there, not a recording), ConfigError (camera, format). Warnings go to the logger "plumbline".
     """
-    core = _core.open(
-        path_of(input, "input"), pipelines(), os.fspath(camera), format, start, end, every, poses, threads,
-        dict(topics or {}),
-    )
+    options = reading(_core.RecordingOptions(), camera, format, start, end, every, poses, topics)
+    core = _core.open(path_of(input, "input"), options, threads)
     tell(core.messages())
     return Recording(core, raw)

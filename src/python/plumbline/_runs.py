@@ -6,23 +6,23 @@ import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import TracebackType
-from typing import Any, Callable, List, Mapping, Optional, Sequence, Type, Union
+from typing import Any, Callable, List, Mapping, Optional, Sequence, Type, TypeVar, Union
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _core
 from ._core import Camera
-from ._paths import pipelines
-from ._recording import camera as find_camera
+from ._recording import camera as find_camera, reading
 from ._result import Localization, Result
 from ._values import PathLike, overrides, path_of, tell
 
 Progress = Callable[[int, int], None]
+_Options = TypeVar("_Options", bound=_core.RunOptions)
 _LOOK_UP = 0.05  # seconds between two checks for signals and messages
 
 
-def _finish(run: _core.Background, progress: Optional[Progress] = None) -> None:
+def _finish(run: Union[_core.Run, _core.MapperRun], progress: Optional[Progress] = None) -> None:
     """Waits for a run. After Ctrl-C the run first writes what it has; then KeyboardInterrupt is raised."""
     interrupted: Optional[KeyboardInterrupt] = None
     shown = (0, 0)
@@ -53,7 +53,16 @@ def _finish(run: _core.Background, progress: Optional[Progress] = None) -> None:
 def _files(given: Union[PathLike, Sequence[PathLike]]) -> List[str]:
     if isinstance(given, (str, os.PathLike)):
         return [path_of(given, "recording")]
+    if not given:
+        raise _core.ConfigError("inputs: name a recording")
     return [path_of(one, "recording") for one in given]
+
+
+def _running(options: _Options, pipeline: PathLike, given: Mapping[str, Any], threads: int, force: bool) -> _Options:
+    """`options` with the arguments that all runs share."""
+    options.pipeline, options.set = path_of(pipeline, "pipeline"), overrides(given)
+    options.threads, options.replace = threads, force
+    return options
 
 
 def map(  # noqa: A001, the program's name for it
@@ -85,11 +94,13 @@ def map(  # noqa: A001, the program's name for it
     The interpreter is free meanwhile: other threads run. Ctrl-C ends the run, which writes what it has; then
     KeyboardInterrupt is raised. Raises ConfigError, InputError, OutputError as the program's exit codes 2, 3, 5.
     """
-    earlier = "" if into is None else os.fspath(into.folder) if isinstance(into, Result) else path_of(into, "into")
-    run = _core.start_map(
-        _files(recording), path_of(output, "output"), path_of(pipeline, "pipeline"), overrides(options), pipelines(),
-        os.fspath(camera), format, start, end, every, poses, dict(topics or {}), threads, force, resume, "", earlier,
-    )
+    wanted = _running(_core.MapOptions(), pipeline, options, threads, force)
+    files = _files(recording)
+    wanted.others, wanted.resume = files[1:], resume
+    if into is not None:
+        wanted.into = os.fspath(into.folder) if isinstance(into, Result) else path_of(into, "into")
+    reading(wanted, camera, format, start, end, every, poses, topics)
+    run = _core.start_map(files[0], path_of(output, "output"), wanted)
     _finish(run, progress)
     return Result(output)
 
@@ -116,10 +127,10 @@ def localize(
     map  a result folder of `map` or `fuse`, its map.db, or a Result
     """
     known = os.fspath(map.folder) if isinstance(map, Result) else path_of(map, "map")
-    run = _core.start_map(
-        _files(recording), path_of(output, "output"), path_of(pipeline, "pipeline"), overrides(options), pipelines(),
-        os.fspath(camera), format, start, end, every, "ignore", dict(topics or {}), threads, force, False, known, "",
-    )
+    wanted = _running(_core.MapOptions(), pipeline, options, threads, force)
+    wanted.known_map = known
+    reading(wanted, camera, format, start, end, every, "ignore", topics)
+    run = _core.start_map(path_of(recording, "recording"), path_of(output, "output"), wanted)
     _finish(run, progress)
     return Localization(output)
 
@@ -140,10 +151,9 @@ def fuse(
     anchor  robot whose map defines the frame; "": the one with the largest map
     """
     folders = [os.fspath(one.folder) if isinstance(one, Result) else path_of(one, "maps") for one in maps]
-    run = _core.start_fuse(
-        folders, path_of(output, "output"), path_of(pipeline, "pipeline"), overrides(options), pipelines(), anchor,
-        threads, force,
-    )
+    wanted = _running(_core.FuseOptions(), pipeline, options, threads, force)
+    wanted.anchor = anchor
+    run = _core.start_fuse(folders, path_of(output, "output"), wanted)
     _finish(run, progress)
     return Result(output)
 
@@ -227,16 +237,15 @@ class Mapper:
             raise _core.ConfigError(f"queue: {queue} is out of range (allowed: at least 1)")
         self._temporary = TemporaryDirectory(prefix="plumbline-") if output is None else None
         self._output = Path(self._temporary.name) / name if self._temporary else Path(path_of(output or "", "output"))
-        self._queue = queue
         self._drop_late = drop_late
         self._result: Optional[Result] = None
         self._process = os.getpid()
         self.dropped = 0
         self.fed = 0
         known = camera if isinstance(camera, Camera) else find_camera(camera)
-        self._run = _core.MapperRun(
-            known, self._output, path_of(pipeline, "pipeline"), overrides(options), pipelines(), name, threads, force
-        )
+        wanted = _running(_core.MapperOptions(), pipeline, options, threads, force)
+        wanted.name, wanted.queue = name, queue
+        self._run = _core.MapperRun(known, self._output, wanted)
 
     def feed(
         self,
@@ -264,7 +273,7 @@ class Mapper:
             raise TypeError(f"feed(color, depth, stamp) takes two arrays and a number of seconds, not {kinds}")
 
         self._check()
-        while not self._run.wait_for_room(self._queue, 0.0 if self._drop_late else _LOOK_UP):
+        while not self._run.wait_for_room(0.0 if self._drop_late else _LOOK_UP):
             self._check()
             if self._drop_late:
                 self.dropped += 1
@@ -281,7 +290,7 @@ class Mapper:
         if self._result is None:
             self._check_process()
             self._run.close()
-            _finish(self._run.run, progress)
+            _finish(self._run, progress)
             self._result = Result(self._output, self._temporary)
         return self._result
 
@@ -289,9 +298,9 @@ class Mapper:
         """Cancels the run; nothing is written."""
         if self._result is None:
             self._run.abandon()
-            self._run.run.request_stop()
+            self._run.request_stop()
             if self._temporary is not None and os.getpid() == self._process:
-                while not self._run.run.wait(_LOOK_UP):
+                while not self._run.wait(_LOOK_UP):
                     pass
                 self._temporary.cleanup()
 
@@ -316,9 +325,9 @@ class Mapper:
         self._check_process()
         if self._result is not None:
             raise _core.InputError("the mapper has finished and accepts no more frames")
-        tell(self._run.run.messages())
-        if self._run.run.done:
-            self._run.run.reason()  # raises what ended it
+        tell(self._run.messages())
+        if self._run.done:
+            self._run.reason()  # raises what ended it
             raise _core.InputError("the run has ended and accepts no more frames")
 
     def _pose(self, index: int) -> Optional[Any]:
