@@ -34,7 +34,7 @@ class RobotBodies {
     inertial::BodyMotion motion;
     std::size_t seen = 0;  ///< frame poses that it has learnt from
     inertial::Use told_gyro = inertial::Use::kNone, told_wheels = inertial::Use::kNone;
-    std::optional<inertial::FeltUp> up;
+    std::optional<inertial::FeltUp> up = std::nullopt;
   };
   void tell(const RobotInfo& robot, const char* what, inertial::Use now, inertial::Use& told);
 
