@@ -39,7 +39,7 @@ Unknowns expected_sigma(bool known) {
 Vector6d difference(const WheelStretch& stretch, const WheelCalibration& how) {
   const double length = stretch.camera.translation.norm();
   const double angle = geometry::rotation_angle(stretch.camera.rotation);
-  const double sigma_m = 0.006 + 0.02 * length + 0.02 * angle, sigma_rad = 0.006 + 0.02 * angle;
+  const double sigma_m = 0.003 + 0.01 * length + 0.02 * angle, sigma_rad = 0.006 + 0.02 * angle;
   Vector6d off = geometry::log_se3(camera_motion(stretch.body, how) * stretch.camera.inverse());
   off.head<3>() /= sigma_m;
   off.tail<3>() /= sigma_rad;
@@ -91,7 +91,7 @@ WheelFit fit_wheels(const std::vector<WheelStretch>& stretches, const WheelCalib
     fit.how = changed(fit.how, step);
     fit.how.agreeing =
         static_cast<double>(agreeing) / static_cast<double>(std::max<std::size_t>(1, stretches.size()));
-    worth = std::max(1.0, squares / std::max(1.0, 6.0 * static_cast<double>(agreeing)));
+    worth = std::max(0.3, squares / std::max(1.0, 6.0 * static_cast<double>(agreeing)));
   }
   fit.how.scale_sigma = std::sqrt(worth * information.inverse()(0, 0));
   return fit;
