@@ -196,6 +196,7 @@ GraphReport put_together(const std::vector<GraphAnchor>& anchors, const std::vec
   report.draws.resize(anchors.size());
   const Eigen::MatrixXd draws = equations.draw(report.weight);
   double squares = 0.0;
+
   for (Eigen::Index s = 0; s < draws.cols(); ++s) {
     const std::vector<Vector6d> motions = equations.without_whole(draws.col(s));
     for (std::size_t a = 0; a < anchors.size(); ++a) {
@@ -204,6 +205,7 @@ GraphReport put_together(const std::vector<GraphAnchor>& anchors, const std::vec
       report.draws[a][static_cast<std::size_t>(s)] = motions[a];
     }
   }
+
   report.draws_rms_m =
       std::sqrt(squares / static_cast<double>(draws.cols()) / static_cast<double>(anchors.size()));
   return report;

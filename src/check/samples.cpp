@@ -15,9 +15,6 @@ namespace {
 using geometry::PoseSamples;
 using geometry::Vector6d;
 
-/// E is the RMS error of half of the results; samples are wider, so that 95 % intervals hold for 95 % of the
-/// lengths in all of them (docs/method/trust.md).
-constexpr double kWider = 1.0;
 constexpr std::uint64_t kSeedOfSigns = 32;
 
 /// Numbers of mean square 1.
@@ -47,14 +44,14 @@ std::vector<AnchorSamples> possible_errors(const CheckReport& report, const std:
   const double share = found_share();
   const double found_m = share * graph.rms_m;
   const double rest_m = std::sqrt(std::max(0.0, report.expected_m * report.expected_m - found_m * found_m));
-  const double of_draws = kWider * rest_m / std::max(1e-9, graph.draws_rms_m);
+  const double of_draws = rest_m / std::max(1e-9, graph.draws_rms_m);
   const auto of_found = factors();
 
   std::vector<AnchorSamples> all;
   for (std::size_t a = 0; a < anchors.size(); ++a) {
     AnchorSamples one{anchors[a].stamp, anchors[a].way, {}};
     for (std::size_t s = 0; s < of_found.size(); ++s)
-      one.world[s] = kWider * share * of_found[s] * graph.found[a] + of_draws * graph.draws[a][s];
+      one.world[s] = share * of_found[s] * graph.found[a] + of_draws * graph.draws[a][s];
     all.push_back(one);
   }
   return all;

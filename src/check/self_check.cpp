@@ -226,6 +226,7 @@ class Check {
     std::vector<GraphAnchor> anchors;
     for (const std::size_t a : anchors_)
       anchors.push_back({frames_[a].poses.world_from_depth, frames_[a].frame.way, frames_[a].frame.stamp});
+
     set_split(report);
     const GraphReport graph = set_graph(anchors, report);
     set_local(report);
@@ -263,6 +264,7 @@ class Check {
     report.graph_m = graph.rms_m;
     for (std::size_t a = 0; a < anchors_.size(); ++a)
       report.along.push_back({graph.shift_m[a], anchors[a].stamp, anchors[a].way});
+
     for (const auto& pairs : pairs_) {
       for (const AlignedPair& pair : pairs) note_along(pair, report);
     }

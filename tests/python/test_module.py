@@ -325,6 +325,24 @@ class Results(Folder):
         self.assertGreater(sigmas.max(), 0.0)
         self.assertIsNone(plumbline.open(self.recording).truth.covariance)
 
+    def test_lengths_come_with_what_the_poses_errors_can_change(self):
+        keyframes, samples = self.result.keyframes, self.result.pose_samples
+        last = len(keyframes.stamps) - 1
+        self.assertEqual(samples.shape, (last + 1, 32, 6))
+        ends = (keyframes.poses[[0, last]] @ [0.1, 0.0, 1.5, 1.0])[:, :3]
+        length = self.result.length(ends, seen=[0, last])
+        self.assertAlmostEqual(length.metres, float(np.linalg.norm(ends[1] - ends[0])))
+        self.assertTrue(1e-5 < length.within < 0.3, length)
+        self.assertGreater(self.result.length(ends).metres, 0.0)
+
+        # Both points move with one camera; a result without samples says so.
+        self.assertLess(self.result.length(ends, seen=[0, 0]).within, 0.1 * length.within)
+        (self.work / "bare").mkdir()
+        for name in ("summary.json", "config.yaml", "trajectory.txt"):
+            shutil.copy(self.result.folder / name, self.work / "bare" / name)
+        with self.assertRaisesRegex(plumbline.InputError, "pose_samples.npy"):
+            plumbline.load(self.work / "bare").pose_samples
+
     def test_landmarks_lie_where_their_keyframes_saw_them(self):
         landmarks, keyframes, camera = self.result.landmarks, self.result.keyframes, self.result.camera
         self.assertEqual(len(landmarks.point), len(landmarks.pixel))

@@ -118,6 +118,7 @@ Json path_json(const CameraPath& path, bool z_up) {
 void add_samples(const Keyframe& keyframe, bool z_up, Json& json) {
   std::vector<double> motions;
   std::array<double, 2> most{1e-12, 1e-12};
+
   for (const geometry::Vector6d& motion : *keyframe.in_camera) {
     if (!motion.allFinite()) return;
     for (const int part : {0, 1}) {

@@ -144,7 +144,9 @@ TEST_F(MapCommand, SameBytesForAnyNumberOfThreadsAndFromItsOwnConfiguration) {
     const Outcome again = run("map wall -q -o c_" + name + " -p a_" + name + "/config.yaml");
     ASSERT_EQ(again.code, 0) << again;
     for (const char* file : {"map.ply", "map.pcd", "trajectory.txt", "keyframes.txt", "keyframes.csv",
-                             "lines.ply", "frames.csv"}) {
+                             "lines.ply", "frames.csv", "pose_samples.npy"}) {
+      if (name == "known_poses" && !fs::exists(path("a_" + name) / file))
+        continue;  // its path is not checked
       const std::string bytes = slurp(path("a_" + name) / file);
       EXPECT_EQ(bytes, slurp(path("b_" + name) / file)) << name << " " << file;
       EXPECT_EQ(bytes, slurp(path("c_" + name) / file)) << name << " " << file;

@@ -201,7 +201,7 @@ TEST(ViewerEncode, SmallAndTheSameEachTime) {
   Cost cost;
   const std::string html = page(scene, "test", &cost);
   EXPECT_EQ(html, page(scene, "test"));
-  EXPECT_LE(cost.code, 61000U);
+  EXPECT_LE(cost.code, 61500U);
   EXPECT_EQ(cost.points, 400000U);
   EXPECT_LT(static_cast<double>(cost.place_and_color) / 4e5,
             5.0);  // at random places; surfaces of maps: under 4.2
@@ -234,6 +234,29 @@ TEST(ViewerEncode, AMapWhoseYIsDownIsTurnedUpright) {
   points.positions = {{1, 2, 3}};
   const auto read = read_back(encode(points, false), points);
   EXPECT_LT((read.front().place - Eigen::Vector3d(1, 3, -2)).norm(), 0.003);
+}
+
+TEST(ViewerEncode, ErrorsOfAPoseAreTurnedWithItsCamera) {
+  Scene scene;
+  scene.z_up = false;
+  scene.keyframes.resize(1);
+  Keyframe& keyframe = scene.keyframes.front();
+  keyframe.world_from_camera.rotation =
+      Eigen::AngleAxisd(M_PI / 2.0, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  keyframe.in_camera.emplace();
+  keyframe.in_camera->fill(geometry::Vector6d::Zero());
+  keyframe.in_camera->front() << 0.32, 0.0, -0.16, 0.0, 0.0, 0.064;
+  const std::string html = page(scene, "test");
+
+  // 16 bits each: the camera's x is the world's y, which is -z of what is shown.
+  const std::vector<std::int16_t> steps{0, -16000, -32000, 0, 32000, 0};
+  std::string bytes(reinterpret_cast<const char*>(steps.data()), 12);
+  EXPECT_NE(html.find("\"s\":\"" + base64(bytes)), std::string::npos);
+  EXPECT_NE(html.find("\"e\":[1"), std::string::npos);
+
+  // Of a pose that nothing is known of there is nothing.
+  keyframe.in_camera->front()[2] = std::nan("");
+  EXPECT_EQ(page(scene, "test").find("\"s\":\""), std::string::npos);
 }
 
 TEST(ViewerEncode, Base64) {
