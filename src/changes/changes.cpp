@@ -12,7 +12,7 @@
 namespace plumbline::changes {
 namespace {
 
-/// Of the points of each cell that face one way the one nearest to its centre.
+/// The point nearest to the centre of each cell, one for each way that points face.
 std::vector<std::uint32_t> core_points(const Surface& surface, double spacing_m) {
   struct Candidate {
     std::uint64_t cell;
@@ -102,18 +102,18 @@ Change shifted_change(const std::vector<Place>& places, const Piece& piece, cons
   std::vector<float> ways, limits;
   Eigen::Vector3f normal(0, 0, 0);
   for (const std::uint32_t i : piece) {
-    ways.push_back(places[i].distance.way_m);
+    ways.push_back(places[i].distance.shift_m);
     limits.push_back(places[i].distance.limit_m);
     normal += places[i].normal;
   }
-  change.way_m = median_of(std::move(ways));
+  change.shift_m = median_of(std::move(ways));
   change.limit_m = median_of(std::move(limits));
   change.sigma_m = change.limit_m / 1.96;
   change.normal = normal.normalized().cast<double>();
-  change.after_from_before.translation = change.way_m * change.normal;
+  change.after_from_before.translation = change.shift_m * change.normal;
   change.after = change.before;
   change.after.translate(change.after_from_before.translation);
-  change.volume_m3 = change.area_m2 * std::abs(change.way_m);
+  change.volume_m3 = change.area_m2 * std::abs(change.shift_m);
   return change;
 }
 
@@ -240,7 +240,7 @@ Comparison find_changes(const Surface& before, const Surface& after, const Looke
     if (d.known()) {
       d.limit_m = static_cast<float>(detection_limit(d.before, d.after, result.registration_m));
       limits.push_back(d.limit_m);
-      if (std::abs(d.way_m) > d.limit_m) place.kind = PlaceKind::kShifted;
+      if (std::abs(d.shift_m) > d.limit_m) place.kind = PlaceKind::kShifted;
     }
     result.places.push_back(place);
   }
@@ -259,7 +259,7 @@ Comparison find_changes(const Surface& before, const Surface& after, const Looke
   double near = 0.0;
   for (const Place& place : result.places) {
     ++result.counts[static_cast<std::size_t>(place.kind)];
-    if (place.distance.known() && std::abs(place.distance.way_m) < kNear_m) near += 1.0;
+    if (place.distance.known() && std::abs(place.distance.shift_m) < kNear_m) near += 1.0;
   }
   const auto count = [&](PlaceKind kind) {
     return static_cast<double>(result.counts[static_cast<std::size_t>(kind)]);

@@ -14,14 +14,14 @@ namespace {
 /// A shift that is no noise: a thousandth of unchanged places are further from their limit.
 bool is_clear(const Place& place, const ChangeOptions& options) {
   constexpr float kClear = 1.68F;  // 3.3 standard deviations
-  return std::abs(place.distance.way_m) >=
+  return std::abs(place.distance.shift_m) >=
          std::max(kClear * place.distance.limit_m, static_cast<float>(options.min_shift_m));
 }
 
 /// Which way a place went, for places that may be joined: of shifts, facing and sign.
 int direction_of(const Place& place) {
   if (place.kind != PlaceKind::kShifted) return 0;
-  return 2 * cloud::facing(place.normal) + (place.distance.way_m < 0.0F ? 1 : 0);
+  return 2 * cloud::facing(place.normal) + (place.distance.shift_m < 0.0F ? 1 : 0);
 }
 
 /// Places of the kind that have enough of their like around them.

@@ -90,7 +90,7 @@ void move(viewer::Points& points, const Rigid3& motion, const Eigen::Vector3d& s
   }
 }
 
-/// Whether the stamps say that what was given as the later map is the earlier one: both have the time of day.
+/// True if the stamps say that what was given as the later map is the earlier one: both have the time of day.
 bool stamps_disagree(const std::optional<SeenSpace>& before, const std::optional<SeenSpace>& after) {
   constexpr double kDated_s = 1e8;  // 1973; what is less counts from the start of something
   return before && after && after->first_stamp_s() > kDated_s &&
@@ -151,7 +151,7 @@ core::Result<Pair> lay_together(const CompareRequest& request, const core::Execu
   exports::ExportRequest second = first;
   first.input = request.before;
   second.input = request.after;
-  auto view = exports::view_of_two(first, second, executor, log, progress);
+  auto view = exports::view_of_two(first, second, executor, log, progress, false);
   if (!view) return tl::unexpected<core::Error>(view.error());
 
   Pair pair;

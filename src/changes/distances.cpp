@@ -61,7 +61,7 @@ std::vector<Distance> distances(const std::vector<Eigen::Vector3f>& cores,
       d.before = points_in_cylinder(before, first, cores[i], normals[i], options, found);
       d.after = points_in_cylinder(after, second, cores[i], normals[i], options, found);
       if (d.before.count < least || d.after.count < least) continue;
-      d.way_m = static_cast<float>(d.after.mean_m - d.before.mean_m);
+      d.shift_m = static_cast<float>(d.after.mean_m - d.before.mean_m);
       d.limit_m = static_cast<float>(detection_limit(d.before, d.after, registration_m));
     }
   });
@@ -78,7 +78,7 @@ double registration_sigma(const std::vector<Eigen::Vector3f>& cores,
     if (!distances[i].known()) continue;
     const Eigen::Vector3i cell = cloud::cell_of(cores[i].cast<double>() / kBlock_m);
     ways.emplace_back(cloud::pack_cell({6 * cell.x() + cloud::facing(normals[i]), cell.y(), cell.z()}),
-                      distances[i].way_m);
+                      distances[i].shift_m);
   }
   std::sort(ways.begin(), ways.end());
 
@@ -89,9 +89,9 @@ double registration_sigma(const std::vector<Eigen::Vector3f>& cores,
       medians.push_back(std::abs(static_cast<double>(ways[(begin + end) / 2].second)));
   }
   if (medians.size() < 5) return 0.0;
-  const auto at = medians.begin() + static_cast<long>(0.8 * static_cast<double>(medians.size() - 1));
+  const auto at = medians.begin() + static_cast<long>(0.65 * static_cast<double>(medians.size() - 1));
   std::nth_element(medians.begin(), at, medians.end());
-  return *at / 1.2816;
+  return *at / 0.9346;
 }
 
 }  // namespace plumbline::changes

@@ -43,7 +43,7 @@ std::string markup(const std::string& text) {
   return out;
 }
 
-/// What the nearest place says of each point, as two layers.
+/// Two layers: kind and shift of the place nearest to each point.
 void add_layers(viewer::Points& points, const Comparison& comparison, const Shown& shown, bool later,
                 const core::Executor& executor) {
   constexpr float kReach2 = 0.06F * 0.06F;
@@ -78,7 +78,7 @@ void add_layers(viewer::Points& points, const Comparison& comparison, const Show
           place.change >= 0 &&
           comparison.changes[static_cast<std::size_t>(place.change)].kind == ChangeKind::kMoved;
       kind.values[i] = moved ? 6.0F : static_cast<float>(place.kind);
-      way.values[i] = place.distance.way_m;
+      way.values[i] = place.distance.shift_m;
     }
   });
   points.layers.push_back(std::move(kind));

@@ -74,7 +74,8 @@ std::vector<std::uint8_t> SeenSpace::looked_through(const std::vector<Eigen::Vec
 
   std::vector<std::uint8_t> result(points.size());
   for (std::size_t i = 0; i < points.size(); ++i)
-    result[i] = votes[i].free >= 2 && 2 * votes[i].free >= votes[i].surface ? 1 : 0;
+    result[i] =
+        votes[i].free > 0 && 2 * votes[i].free >= votes[i].surface + (votes[i].free == 1 ? 2 : 0) ? 1 : 0;
   return result;
 }
 
