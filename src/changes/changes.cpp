@@ -23,6 +23,7 @@ std::vector<std::uint32_t> core_points(const Surface& surface, double spacing_m)
       return std::tie(cell, facing, off, index) < std::tie(o.cell, o.facing, o.off, o.index);
     }
   };
+
   std::vector<Candidate> all;
   all.reserve(surface.points.size());
   for (std::uint32_t i = 0; i < surface.points.size(); ++i) {
@@ -59,7 +60,7 @@ Cores measured_cores(const Surface& of, const Surface& before, const Surface& af
   return cores;
 }
 
-/// What the places of the one surface are that the other lacks: changed where its cameras looked through
+/// Decides on places of one surface that the other lacks: changed where its cameras looked through
 /// them.
 void judge_lone(std::vector<Place>& places, std::size_t first, PlaceKind changed, PlaceKind unseen,
                 const LookedThrough& through) {
@@ -100,12 +101,14 @@ Change shifted_change(const std::vector<Place>& places, const Piece& piece, cons
   change.kind = ChangeKind::kShifted;
   add_piece(places, piece, options, change.before, change);
   std::vector<float> ways, limits;
+
   Eigen::Vector3f normal(0, 0, 0);
   for (const std::uint32_t i : piece) {
     ways.push_back(places[i].distance.shift_m);
     limits.push_back(places[i].distance.limit_m);
     normal += places[i].normal;
   }
+
   change.shift_m = median_of(std::move(ways));
   change.limit_m = median_of(std::move(limits));
   change.sigma_m = change.limit_m / 1.96;
@@ -189,6 +192,7 @@ std::vector<Change> list_changes(std::vector<Place>& places, const Surface& befo
     for (const std::size_t k : move.vanished) moved_v[k] = 1;
     for (const std::size_t k : move.appeared) moved_a[k] = 1;
   }
+
   for (std::size_t k = 0; k < vanished.size(); ++k) {
     if (moved_v[k] == 0) listing.add_lone(ChangeKind::kVanished, vanished[k]);
   }
@@ -234,6 +238,7 @@ Comparison find_changes(const Surface& before, const Surface& after, const Looke
 
   // Places of the earlier surface, then those of the later one that the earlier lacks.
   std::vector<float> limits;
+
   for (std::size_t i = 0; i < of_before.points.size(); ++i) {
     Place place{of_before.points[i], of_before.normals[i], PlaceKind::kSame, false, of_before.distances[i]};
     Distance& d = place.distance;
@@ -244,6 +249,7 @@ Comparison find_changes(const Surface& before, const Surface& after, const Looke
     }
     result.places.push_back(place);
   }
+
   result.median_limit_m = median_of(std::move(limits));
   judge_lone(result.places, 0, PlaceKind::kVanished, PlaceKind::kNotSeenAfter, through_after);
 
@@ -261,6 +267,7 @@ Comparison find_changes(const Surface& before, const Surface& after, const Looke
     ++result.counts[static_cast<std::size_t>(place.kind)];
     if (place.distance.known() && std::abs(place.distance.shift_m) < kNear_m) near += 1.0;
   }
+
   const auto count = [&](PlaceKind kind) {
     return static_cast<double>(result.counts[static_cast<std::size_t>(kind)]);
   };

@@ -122,10 +122,12 @@ std::string terminal_text(const Comparison& comparison, const std::string& placi
       "places     {} same, {} shifted, {} appeared, {} vanished, {} not seen before, {} not seen after\n",
       count(PlaceKind::kSame), count(PlaceKind::kShifted), count(PlaceKind::kAppeared),
       count(PlaceKind::kVanished), count(PlaceKind::kNotSeenBefore), count(PlaceKind::kNotSeenAfter));
+
   text +=
       fmt::format("limit      {:.1f} mm in the median (95 %), {:.1f} mm of it how the maps lie (1 sigma)\n",
                   1000.0 * comparison.median_limit_m, 1000.0 * comparison.registration_m);
   text += fmt::format("changes    {}\n", comparison.changes.size());
+
   for (std::size_t i = 0; i < std::min(kMost, comparison.changes.size()); ++i) {
     const Eigen::Vector3d at = comparison.changes[i].box().center();
     text += fmt::format("  {:<3} {} at {:.2f} {:.2f} {:.2f}\n", i + 1, text_of(comparison.changes[i]), at.x(),
@@ -201,6 +203,7 @@ core::Result<CompareSummary> compare_maps(const CompareRequest& request, const c
   if (!pair) return tl::unexpected<core::Error>(pair.error());
 
   CompareSummary summary;
+
   if (request.order == Order::kStamps && stamps_disagree(pair->space_before, pair->space_after)) {
     CompareRequest turned = request;
     std::swap(turned.before, turned.after);
@@ -218,6 +221,7 @@ core::Result<CompareSummary> compare_maps(const CompareRequest& request, const c
                    function_of(pair->space_after, executor), pair->shown.up, request.options, executor);
   if (auto fits = check_fit(summary.comparison, request); !fits)
     return tl::unexpected<core::Error>(fits.error());
+
   for (const auto* known : {&pair->shown.free_space_before, &pair->shown.free_space_after}) {
     if (!*known)
       log.info(fmt::format(

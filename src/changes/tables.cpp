@@ -52,6 +52,7 @@ cloud::CloudPtr cloud_of(const Comparison& comparison) {
 /// Columns of changes.ply.
 cloud::CloudColumns columns_of(const Comparison& comparison) {
   using Value = float (*)(const Place&);
+
   const std::vector<std::pair<const char*, Value>> values = {
       {"kind", [](const Place& p) { return static_cast<float>(p.kind); }},
       {"later", [](const Place& p) { return p.later ? 1.0F : 0.0F; }},
@@ -62,6 +63,7 @@ cloud::CloudColumns columns_of(const Comparison& comparison) {
       {"points_after", [](const Place& p) { return static_cast<float>(p.distance.after.count); }},
       {"roughness_before", [](const Place& p) { return static_cast<float>(p.distance.before.sigma_m); }},
       {"roughness_after", [](const Place& p) { return static_cast<float>(p.distance.after.sigma_m); }}};
+
   cloud::CloudColumns columns;
   for (const auto& [name, value] : values) {
     cloud::CloudColumns::Other column{name, {}};
@@ -139,9 +141,11 @@ std::string text_of(const Change& change) {
     const Eigen::Vector3d s = box.sizes();
     return fmt::format("{:.2f} x {:.2f} x {:.2f} m", s.x(), s.y(), s.z());
   };
+
   switch (change.kind) {
     case ChangeKind::kMoved: {
       const double turn = change.turn_rad * 180.0 / M_PI;
+
       return fmt::format("moved by {:.2f} m{}", way_of(change).norm(),
                          std::abs(turn) < 2.0 ? "" : fmt::format(", turned by {:.0f} degrees", turn));
     }
@@ -152,6 +156,7 @@ std::string text_of(const Change& change) {
     case ChangeKind::kVanished:
       break;
   }
+
   return fmt::format("{}: {}", name_of(change.kind), size(change.box()));
 }
 
@@ -171,6 +176,7 @@ core::Result<void> write_pictures(const std::filesystem::path& folder, const Com
   scene.cloud = cloud_of(comparison);
   scene.title = core::printable(shown.before + " -> " + shown.after);
   viz::SnapshotOptions options;
+
   options.up = shown.up;
   std::vector<viz::Snapshot> snapshots;
   for (const viz::View view : {viz::View::kTop, viz::View::kIso}) {
