@@ -12,7 +12,7 @@
 namespace plumbline::changes {
 namespace {
 
-/// Of the points of each cell that face one way the one nearest to its centre.
+/// The point nearest to the centre of each cell, one for each way that points face.
 std::vector<std::uint32_t> core_points(const Surface& surface, double spacing_m) {
   struct Candidate {
     std::uint64_t cell;
@@ -23,6 +23,7 @@ std::vector<std::uint32_t> core_points(const Surface& surface, double spacing_m)
       return std::tie(cell, facing, off, index) < std::tie(o.cell, o.facing, o.off, o.index);
     }
   };
+
   std::vector<Candidate> all;
   all.reserve(surface.points.size());
   for (std::uint32_t i = 0; i < surface.points.size(); ++i) {
@@ -34,11 +35,30 @@ std::vector<std::uint32_t> core_points(const Surface& surface, double spacing_m)
   }
   std::sort(all.begin(), all.end());
 
-  std::vector<std::uint32_t> chosen;
+  std::vector<Eigen::Vector3f> points;
+  std::vector<std::uint32_t> candidates;
   for (std::size_t i = 0; i < all.size(); ++i) {
-    if (i == 0 || all[i].cell != all[i - 1].cell || all[i].facing != all[i - 1].facing)
-      chosen.push_back(all[i].index);
+    if (i > 0 && all[i].cell == all[i - 1].cell && all[i].facing == all[i - 1].facing) continue;
+    candidates.push_back(all[i].index);
+    points.push_back(surface.points[all[i].index]);
   }
+
+  // A surface along the border of two cells has one point in each: the first of two near ones stays.
+  const PointSearch search(points);
+  PointSearch::Found found;
+  std::vector<std::uint8_t> kept(candidates.size(), 0);
+  std::vector<std::uint32_t> chosen;
+  for (std::uint32_t k = 0; k < candidates.size(); ++k) {
+    search.within(points[k], 0.5 * spacing_m, found);
+    const bool near = std::any_of(found.begin(), found.end(), [&](const auto& f) {
+      return kept[f.first] != 0 &&
+             surface.normals[candidates[f.first]].dot(surface.normals[candidates[k]]) > 0.7F;
+    });
+    if (near) continue;
+    kept[k] = 1;
+    chosen.push_back(candidates[k]);
+  }
+
   return chosen;
 }
 
@@ -59,7 +79,7 @@ Cores measured_cores(const Surface& of, const Surface& before, const Surface& af
   return cores;
 }
 
-/// What the places of the one surface are that the other lacks: changed where its cameras looked through
+/// Decides on places of one surface that the other lacks: changed where its cameras looked through
 /// them.
 void judge_lone(std::vector<Place>& places, std::size_t first, PlaceKind changed, PlaceKind unseen,
                 const LookedThrough& through) {
@@ -100,20 +120,22 @@ Change shifted_change(const std::vector<Place>& places, const Piece& piece, cons
   change.kind = ChangeKind::kShifted;
   add_piece(places, piece, options, change.before, change);
   std::vector<float> ways, limits;
+
   Eigen::Vector3f normal(0, 0, 0);
   for (const std::uint32_t i : piece) {
-    ways.push_back(places[i].distance.way_m);
+    ways.push_back(places[i].distance.shift_m);
     limits.push_back(places[i].distance.limit_m);
     normal += places[i].normal;
   }
-  change.way_m = median_of(std::move(ways));
+
+  change.shift_m = median_of(std::move(ways));
   change.limit_m = median_of(std::move(limits));
   change.sigma_m = change.limit_m / 1.96;
   change.normal = normal.normalized().cast<double>();
-  change.after_from_before.translation = change.way_m * change.normal;
+  change.after_from_before.translation = change.shift_m * change.normal;
   change.after = change.before;
   change.after.translate(change.after_from_before.translation);
-  change.volume_m3 = change.area_m2 * std::abs(change.way_m);
+  change.volume_m3 = change.area_m2 * std::abs(change.shift_m);
   return change;
 }
 
@@ -189,6 +211,7 @@ std::vector<Change> list_changes(std::vector<Place>& places, const Surface& befo
     for (const std::size_t k : move.vanished) moved_v[k] = 1;
     for (const std::size_t k : move.appeared) moved_a[k] = 1;
   }
+
   for (std::size_t k = 0; k < vanished.size(); ++k) {
     if (moved_v[k] == 0) listing.add_lone(ChangeKind::kVanished, vanished[k]);
   }
@@ -234,16 +257,18 @@ Comparison find_changes(const Surface& before, const Surface& after, const Looke
 
   // Places of the earlier surface, then those of the later one that the earlier lacks.
   std::vector<float> limits;
+
   for (std::size_t i = 0; i < of_before.points.size(); ++i) {
     Place place{of_before.points[i], of_before.normals[i], PlaceKind::kSame, false, of_before.distances[i]};
     Distance& d = place.distance;
     if (d.known()) {
       d.limit_m = static_cast<float>(detection_limit(d.before, d.after, result.registration_m));
       limits.push_back(d.limit_m);
-      if (std::abs(d.way_m) > d.limit_m) place.kind = PlaceKind::kShifted;
+      if (std::abs(d.shift_m) > d.limit_m) place.kind = PlaceKind::kShifted;
     }
     result.places.push_back(place);
   }
+
   result.median_limit_m = median_of(std::move(limits));
   judge_lone(result.places, 0, PlaceKind::kVanished, PlaceKind::kNotSeenAfter, through_after);
 
@@ -259,8 +284,9 @@ Comparison find_changes(const Surface& before, const Surface& after, const Looke
   double near = 0.0;
   for (const Place& place : result.places) {
     ++result.counts[static_cast<std::size_t>(place.kind)];
-    if (place.distance.known() && std::abs(place.distance.way_m) < kNear_m) near += 1.0;
+    if (place.distance.known() && std::abs(place.distance.shift_m) < kNear_m) near += 1.0;
   }
+
   const auto count = [&](PlaceKind kind) {
     return static_cast<double>(result.counts[static_cast<std::size_t>(kind)]);
   };

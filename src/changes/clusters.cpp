@@ -11,17 +11,17 @@
 namespace plumbline::changes {
 namespace {
 
-/// A shift that is no noise: a thousandth of unchanged places are further from their limit.
+/// True for a shift that is no noise: maps also bend, by more than their median tells.
 bool is_clear(const Place& place, const ChangeOptions& options) {
-  constexpr float kClear = 1.68F;  // 3.3 standard deviations
-  return std::abs(place.distance.way_m) >=
+  constexpr float kClear = 2.5F;  // 4.9 standard deviations
+  return std::abs(place.distance.shift_m) >=
          std::max(kClear * place.distance.limit_m, static_cast<float>(options.min_shift_m));
 }
 
 /// Which way a place went, for places that may be joined: of shifts, facing and sign.
 int direction_of(const Place& place) {
   if (place.kind != PlaceKind::kShifted) return 0;
-  return 2 * cloud::facing(place.normal) + (place.distance.way_m < 0.0F ? 1 : 0);
+  return 2 * cloud::facing(place.normal) + (place.distance.shift_m < 0.0F ? 1 : 0);
 }
 
 /// Places of the kind that have enough of their like around them.
@@ -64,6 +64,7 @@ std::vector<Piece> pieces_of(const std::vector<Place>& places, PlaceKind kind, c
   std::iota(parent.begin(), parent.end(), 0U);
   const PointSearch search(points);
   PointSearch::Found found;
+
   for (std::uint32_t k = 0; k < chosen.size(); ++k) {
     search.within(points[k], 2.7 * options.spacing_m, found);
     for (const auto& [other, squared] : found) {
@@ -78,6 +79,7 @@ std::vector<Piece> pieces_of(const std::vector<Place>& places, PlaceKind kind, c
   for (std::uint32_t k = 0; k < chosen.size(); ++k) by_root[root_of(parent, k)].push_back(chosen[k]);
   const double least = kind == PlaceKind::kShifted ? kLeastShiftArea : kLeastArea;
   std::vector<Piece> pieces;
+
   for (auto& [root, piece] : by_root) {
     Eigen::AlignedBox3f box;
     for (const std::uint32_t i : piece) box.extend(places[i].at);
@@ -85,6 +87,7 @@ std::vector<Piece> pieces_of(const std::vector<Place>& places, PlaceKind kind, c
     const double extent = static_cast<double>(box.sizes().maxCoeff()) + options.spacing_m;
     if (area >= least && extent >= options.min_size_m) pieces.push_back(std::move(piece));
   }
+
   std::stable_sort(pieces.begin(), pieces.end(),
                    [](const Piece& a, const Piece& b) { return a.size() > b.size(); });
   return pieces;

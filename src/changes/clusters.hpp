@@ -15,7 +15,7 @@ using Piece = std::vector<std::uint32_t>;
 /// Seams and specks that noise makes are left out, and what is smaller than the options ask.
 std::vector<Piece> pieces_of(const std::vector<Place>& places, PlaceKind kind, const ChangeOptions& options);
 
-/// What went from one place to another: pieces of both, and how it went.
+/// A thing that went from one place to another: pieces of both, and how it went.
 struct Move {
   std::vector<std::size_t> vanished, appeared;  ///< indices of pieces; one of the two may be empty
   geometry::Rigid3 after_from_before;

@@ -90,7 +90,7 @@ void move(viewer::Points& points, const Rigid3& motion, const Eigen::Vector3d& s
   }
 }
 
-/// Whether the stamps say that what was given as the later map is the earlier one: both have the time of day.
+/// True if the stamps say that what was given as the later map is the earlier one: both have the time of day.
 bool stamps_disagree(const std::optional<SeenSpace>& before, const std::optional<SeenSpace>& after) {
   constexpr double kDated_s = 1e8;  // 1973; what is less counts from the start of something
   return before && after && after->first_stamp_s() > kDated_s &&
@@ -122,10 +122,12 @@ std::string terminal_text(const Comparison& comparison, const std::string& placi
       "places     {} same, {} shifted, {} appeared, {} vanished, {} not seen before, {} not seen after\n",
       count(PlaceKind::kSame), count(PlaceKind::kShifted), count(PlaceKind::kAppeared),
       count(PlaceKind::kVanished), count(PlaceKind::kNotSeenBefore), count(PlaceKind::kNotSeenAfter));
+
   text +=
       fmt::format("limit      {:.1f} mm in the median (95 %), {:.1f} mm of it how the maps lie (1 sigma)\n",
                   1000.0 * comparison.median_limit_m, 1000.0 * comparison.registration_m);
   text += fmt::format("changes    {}\n", comparison.changes.size());
+
   for (std::size_t i = 0; i < std::min(kMost, comparison.changes.size()); ++i) {
     const Eigen::Vector3d at = comparison.changes[i].box().center();
     text += fmt::format("  {:<3} {} at {:.2f} {:.2f} {:.2f}\n", i + 1, text_of(comparison.changes[i]), at.x(),
@@ -151,7 +153,7 @@ core::Result<Pair> lay_together(const CompareRequest& request, const core::Execu
   exports::ExportRequest second = first;
   first.input = request.before;
   second.input = request.after;
-  auto view = exports::view_of_two(first, second, executor, log, progress);
+  auto view = exports::view_of_two(first, second, executor, log, progress, false);
   if (!view) return tl::unexpected<core::Error>(view.error());
 
   Pair pair;
@@ -201,6 +203,7 @@ core::Result<CompareSummary> compare_maps(const CompareRequest& request, const c
   if (!pair) return tl::unexpected<core::Error>(pair.error());
 
   CompareSummary summary;
+
   if (request.order == Order::kStamps && stamps_disagree(pair->space_before, pair->space_after)) {
     CompareRequest turned = request;
     std::swap(turned.before, turned.after);
@@ -218,6 +221,7 @@ core::Result<CompareSummary> compare_maps(const CompareRequest& request, const c
                    function_of(pair->space_after, executor), pair->shown.up, request.options, executor);
   if (auto fits = check_fit(summary.comparison, request); !fits)
     return tl::unexpected<core::Error>(fits.error());
+
   for (const auto* known : {&pair->shown.free_space_before, &pair->shown.free_space_after}) {
     if (!*known)
       log.info(fmt::format(

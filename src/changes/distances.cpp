@@ -19,6 +19,7 @@ CylinderPoints points_in_cylinder(const Surface& cloud, const PointSearch& searc
 
   CylinderPoints result;
   double sum = 0.0, squares = 0.0;
+
   for (const auto& [index, squared] : found) {
     const float facing = cloud.normals[index].dot(normal);
     if ((cloud.oriented ? facing : std::abs(facing)) < kAlike) continue;
@@ -56,15 +57,17 @@ std::vector<Distance> distances(const std::vector<Eigen::Vector3f>& cores,
 
   executor.parallel_for((cores.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
     PointSearch::Found found;
+
     for (std::size_t i = block * kBlock; i < std::min(cores.size(), (block + 1) * kBlock); ++i) {
       Distance& d = result[i];
       d.before = points_in_cylinder(before, first, cores[i], normals[i], options, found);
       d.after = points_in_cylinder(after, second, cores[i], normals[i], options, found);
       if (d.before.count < least || d.after.count < least) continue;
-      d.way_m = static_cast<float>(d.after.mean_m - d.before.mean_m);
+      d.shift_m = static_cast<float>(d.after.mean_m - d.before.mean_m);
       d.limit_m = static_cast<float>(detection_limit(d.before, d.after, registration_m));
     }
   });
+
   return result;
 }
 
@@ -74,11 +77,12 @@ double registration_sigma(const std::vector<Eigen::Vector3f>& cores,
   constexpr double kBlock_m = 0.5;
   constexpr std::size_t kFewest = 20;  // core points of a block
   std::vector<std::pair<std::uint64_t, float>> ways;
+
   for (std::size_t i = 0; i < cores.size(); ++i) {
     if (!distances[i].known()) continue;
     const Eigen::Vector3i cell = cloud::cell_of(cores[i].cast<double>() / kBlock_m);
     ways.emplace_back(cloud::pack_cell({6 * cell.x() + cloud::facing(normals[i]), cell.y(), cell.z()}),
-                      distances[i].way_m);
+                      distances[i].shift_m);
   }
   std::sort(ways.begin(), ways.end());
 
@@ -88,10 +92,11 @@ double registration_sigma(const std::vector<Eigen::Vector3f>& cores,
     if (end - begin >= kFewest)
       medians.push_back(std::abs(static_cast<double>(ways[(begin + end) / 2].second)));
   }
+
   if (medians.size() < 5) return 0.0;
-  const auto at = medians.begin() + static_cast<long>(0.8 * static_cast<double>(medians.size() - 1));
+  const auto at = medians.begin() + static_cast<long>(0.65 * static_cast<double>(medians.size() - 1));
   std::nth_element(medians.begin(), at, medians.end());
-  return *at / 1.2816;
+  return *at / 0.9346;
 }
 
 }  // namespace plumbline::changes

@@ -17,11 +17,11 @@ using geometry::Rigid3;
 
 constexpr double kReach_m = 0.02;      // of points that lie on a surface
 constexpr double kExplained = 0.7;     // share of a thing's places that must
+constexpr std::size_t kTargets = 12;   // pieces that it may have become, largest first
 constexpr std::size_t kSamples = 150;  // places of a thing that are tried
 
 struct Samples {
   std::vector<Eigen::Vector3f> points, normals;
-  std::vector<std::uint8_t> alone;  ///< of a surface: nothing of the other day lies there
 };
 
 Samples samples_of(const std::vector<Place>& places, const Piece& piece, std::size_t most) {
@@ -52,7 +52,7 @@ struct Ground {
   /// The nearest point that faces like `normal`.
   [[nodiscard]] std::optional<Hit> at(const Eigen::Vector3f& point, const Eigen::Vector3f& normal,
                                       double reach_m, PointSearch::Found& found) const {
-    search.nearest(point, 8, found);
+    search.nearest(point, 4, found);
     for (const auto& [index, squared] : found) {
       if (static_cast<double>(squared) > reach_m * reach_m) break;
       const float facing = surface.normals[index].dot(normal);
@@ -63,7 +63,7 @@ struct Ground {
   }
 };
 
-/// How well a thing lies on the ground.
+/// A thing laid on the ground, and how well it lies there.
 struct Fit {
   Rigid3 motion;  ///< ground from thing
   double turn = 0.0;
@@ -77,6 +77,7 @@ void judge(const Samples& thing, const Ground& ground, Fit& fit) {
   PointSearch::Found found;
   const Eigen::Matrix3f turn = fit.motion.rotation.cast<float>();
   double hits = 0.0, changed = 0.0, squares = 0.0;
+
   for (std::size_t i = 0; i < thing.points.size(); ++i) {
     const Eigen::Vector3f p = (fit.motion * thing.points[i].cast<double>()).cast<float>();
     const auto hit = ground.at(p, turn * thing.normals[i], kReach_m, found);
@@ -87,6 +88,7 @@ void judge(const Samples& thing, const Ground& ground, Fit& fit) {
     ground.changed.nearest(p, 1, found);
     if (!found.empty() && static_cast<double>(found.front().second) < kChanged_m * kChanged_m) changed += 1.0;
   }
+
   const double all = std::max<double>(1.0, static_cast<double>(thing.points.size()));
   fit.share = hits / all;
   fit.changed = changed / all;
@@ -99,16 +101,19 @@ void settle(const Samples& thing, const Ground& ground, const Eigen::Vector3d& u
   constexpr double kAlong = 0.1;  // weight of the distance within the plane
   PointSearch::Found found;
   double reach_m = 0.12;
+
   for (int round = 0; round < rounds; ++round, reach_m = std::max(0.03, 0.75 * reach_m)) {
     const Eigen::Vector3d middle = fit.motion * middle_of(thing);
     Eigen::Matrix4d h = 1e-9 * Eigen::Matrix4d::Identity();
     Eigen::Vector4d g = Eigen::Vector4d::Zero();
+
     for (std::size_t i = 0; i < thing.points.size(); ++i) {
       const Eigen::Vector3d p = fit.motion * thing.points[i].cast<double>();
       const auto hit =
           ground.at(p.cast<float>(), (fit.motion.rotation * thing.normals[i].cast<double>()).cast<float>(),
                     reach_m, found);
       if (!hit) continue;
+
       const Eigen::Vector3d n = hit->normal.cast<double>();
       const Eigen::Matrix3d weight = n * n.transpose() + kAlong * kAlong * Eigen::Matrix3d::Identity();
       Eigen::Matrix<double, 3, 4> j;
@@ -117,6 +122,7 @@ void settle(const Samples& thing, const Ground& ground, const Eigen::Vector3d& u
       h += j.transpose() * weight * j;
       g += j.transpose() * weight * (hit->point.cast<double>() - p);
     }
+
     const Eigen::Vector4d step = h.ldlt().solve(g);
     const Eigen::AngleAxisd turn(step[3], up);
     const Rigid3 about{turn.toRotationMatrix(), middle + step.head<3>() - turn.toRotationMatrix() * middle};
@@ -124,6 +130,7 @@ void settle(const Samples& thing, const Ground& ground, const Eigen::Vector3d& u
     fit.turn += step[3];
     if (step.norm() < 1e-4) break;
   }
+
   judge(thing, ground, fit);
 }
 
@@ -143,6 +150,7 @@ Fit best_place(const Samples& thing, const Ground& ground, const std::vector<Eig
   constexpr double kStep_m = 0.1, kRange_m = 0.6;
   constexpr std::size_t kSettled = 12;
   std::vector<Fit> fits;
+
   for (const Eigen::Vector3d& target : targets) {
     for (int t = -kTurns + 1; t <= kTurns; ++t) fits.push_back(start(thing, target, M_PI / kTurns * t, up));
   }
@@ -155,25 +163,61 @@ Fit best_place(const Samples& thing, const Ground& ground, const std::vector<Eig
 
   // A few rounds with few samples, then the best ones to the end.
   Samples few;
-  for (std::size_t i = 0; i < thing.points.size(); i += 3) {
+  for (std::size_t i = 0; i < thing.points.size(); i += 5) {
     few.points.push_back(thing.points[i]);
     few.normals.push_back(thing.normals[i]);
   }
-  const auto value = [](const Fit& fit) { return fit.share + 0.5 * fit.changed - 0.02 * std::abs(fit.turn); };
-  for (Fit& fit : fits) settle(few, ground, up, 4, fit);
+  const auto value = [&](const Fit& fit) {  // what has not gone anywhere has not moved
+    const bool stays = (fit.motion * middle - middle).norm() < 0.04 && std::abs(fit.turn) < 0.1;
+    return stays ? -1.0 : fit.share + 0.5 * fit.changed - 0.15 * std::abs(fit.turn);
+  };
+
+  for (Fit& fit : fits) settle(few, ground, up, 3, fit);
   std::stable_sort(fits.begin(), fits.end(), [&](const Fit& a, const Fit& b) { return value(a) > value(b); });
   fits.resize(std::min(fits.size(), kSettled));
   for (Fit& fit : fits) settle(thing, ground, up, 20, fit);
-  return *std::max_element(fits.begin(), fits.end(),
-                           [&](const Fit& a, const Fit& b) { return value(a) < value(b); });
+  Fit best = *std::max_element(fits.begin(), fits.end(),
+                               [&](const Fit& a, const Fit& b) { return value(a) < value(b); });
+  if (value(best) < 0.0) best.share = 0.0;
+  return best;
 }
 
-/// Whether the places face at least two ways: a single plane fits any wall.
+/// True if the places face at least two ways: a single plane fits any wall.
 bool has_shape(const std::vector<Eigen::Vector3f>& normals) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3f& n : normals) sum += n.cast<double>() * n.cast<double>().transpose();
   const Eigen::Vector3d values = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(sum).eigenvalues();
   return values[1] > 0.06 * values.sum();
+}
+
+/// Share of a thing's surroundings, along its faces, where the ground goes on: a piece of a wall is no thing.
+double goes_on(const Samples& thing, const Ground& ground, const Rigid3& motion) {
+  const PointSearch search(thing.points);
+  PointSearch::Found found;
+  std::vector<float> apart;
+  for (const Eigen::Vector3f& p : thing.points) {
+    search.nearest(p, 2, found);
+    apart.push_back(found.size() < 2 ? 0.03F : std::sqrt(found[1].second));
+  }
+  std::nth_element(apart.begin(), apart.begin() + static_cast<long>(apart.size() / 2), apart.end());
+  const float spacing = apart[apart.size() / 2];
+
+  double outside = 0.0, ground_there = 0.0;
+
+  for (std::size_t i = 0; i < thing.points.size(); ++i) {
+    const Eigen::Vector3f n = thing.normals[i], u = n.unitOrthogonal(), v = n.cross(u);
+
+    for (const Eigen::Vector3f& beside : {u, v, Eigen::Vector3f(-u), Eigen::Vector3f(-v)}) {
+      const Eigen::Vector3f p = thing.points[i] + 4.0F * spacing * beside;
+      search.nearest(p, 1, found);
+      if (found.front().second < 9.0F * spacing * spacing) continue;
+      outside += 1.0;
+      const Eigen::Vector3d at = motion * p.cast<double>(), normal = motion.rotation * n.cast<double>();
+      if (ground.at(at.cast<float>(), normal.cast<float>(), kReach_m, found)) ground_there += 1.0;
+    }
+  }
+
+  return ground_there / std::max(1.0, outside);
 }
 
 class Moves {
@@ -193,7 +237,9 @@ class Moves {
   /// For the piece by itself: its best place on the other day.
   [[nodiscard]] Fit of(std::size_t piece, bool vanished) const {
     std::vector<Eigen::Vector3d> targets;
-    for (const Samples& other : vanished ? appeared_ : vanished_) targets.push_back(middle_of(other));
+    for (const Samples& other : vanished ? appeared_ : vanished_) {
+      if (targets.size() < kTargets) targets.push_back(middle_of(other));
+    }
     return best_place((vanished ? vanished_ : appeared_)[piece], vanished ? after_ : before_, targets, up_);
   }
 
@@ -207,12 +253,14 @@ class Moves {
     move.rms_m = fit.rms_m;
     std::vector<Eigen::Vector3f> normals;
     double all = 0.0, changed = 0.0;
+
     const auto take = [&](const std::vector<Samples>& pieces, const std::vector<std::uint8_t>& used,
                           const Ground& ground, const Rigid3& motion, std::vector<std::size_t>& taken) {
       for (std::size_t k = 0; k < pieces.size(); ++k) {
         Fit alike;
         alike.motion = motion;
         if (used[k] != 0) continue;
+
         judge(pieces[k], ground, alike);
         if (alike.share < kExplained) continue;
         taken.push_back(k);
@@ -221,17 +269,25 @@ class Moves {
         changed += alike.changed * static_cast<double>(pieces[k].points.size());
       }
     };
+
     take(vanished_, used_v, after_, move.after_from_before, move.vanished);
     take(appeared_, used_a, before_, move.after_from_before.inverse(), move.appeared);
 
     constexpr double kMostlyChanged = 0.5;
     const bool both = !move.vanished.empty() && !move.appeared.empty();
     const bool certain = all > 0.0 && changed / all >= kMostlyChanged;
-    if (both ? has_shape(normals) || certain : has_shape(normals) && certain) return move;
+    if (both ? has_shape(normals) || certain : certain && (has_shape(normals) || bounded(move))) return move;
     return std::nullopt;
   }
 
  private:
+  /// True if the surface that the one piece of a move comes to lie on ends where the piece does.
+  [[nodiscard]] bool bounded(const Move& move) const {
+    constexpr double kMost = 0.3;
+    if (move.appeared.empty())
+      return goes_on(vanished_[move.vanished[0]], after_, move.after_from_before) < kMost;
+    return goes_on(appeared_[move.appeared[0]], before_, move.after_from_before.inverse()) < kMost;
+  }
   /// Places without a counterpart on the other day.
   static std::vector<Eigen::Vector3f> lone(const std::vector<Place>& places, bool later) {
     std::vector<Eigen::Vector3f> points;
@@ -254,6 +310,7 @@ std::vector<Move> find_moves(const std::vector<Place>& places, const std::vector
                              const Eigen::Vector3d& up, const core::Executor& executor) {
   constexpr std::size_t kMost = 60;  // pieces that are tried, largest first
   const Moves moves(places, vanished, appeared, before, after, up);
+
   struct Try {
     std::size_t piece;
     bool vanished;
@@ -270,6 +327,7 @@ std::vector<Move> find_moves(const std::vector<Place>& places, const std::vector
   std::stable_sort(tries.begin(), tries.end(), [&](const Try& a, const Try& b) { return size(a) > size(b); });
   std::vector<std::uint8_t> used_v(vanished.size(), 0), used_a(appeared.size(), 0);
   std::vector<Move> found;
+
   for (const Try& t : tries) {
     if ((t.vanished ? used_v : used_a)[t.piece] != 0 || t.fit.share < kExplained) continue;
     auto move = moves.confirm(t.fit, t.vanished, used_v, used_a);

@@ -11,7 +11,7 @@
 
 namespace plumbline::changes {
 
-/// What the files tell besides the comparison.
+/// Further contents of the files.
 struct Shown {
   std::string before, after;  ///< names
   std::string placing;

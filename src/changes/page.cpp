@@ -43,13 +43,14 @@ std::string markup(const std::string& text) {
   return out;
 }
 
-/// What the nearest place says of each point, as two layers.
+/// Two layers: kind and shift of the place nearest to each point.
 void add_layers(viewer::Points& points, const Comparison& comparison, const Shown& shown, bool later,
                 const core::Executor& executor) {
   constexpr float kReach2 = 0.06F * 0.06F;
   constexpr std::size_t kBlock = 4096;
   std::vector<Eigen::Vector3f> at;
   std::vector<const Place*> places;
+
   for (const Place& place : comparison.places) {
     if (place.later && !later) continue;
     if (later && (place.kind == PlaceKind::kVanished || place.kind == PlaceKind::kNotSeenAfter)) continue;
@@ -69,18 +70,21 @@ void add_layers(viewer::Points& points, const Comparison& comparison, const Show
 
   executor.parallel_for((points.positions.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
     PointSearch::Found found;
+
     for (std::size_t i = block * kBlock; i < std::min(points.positions.size(), (block + 1) * kBlock); ++i) {
       const auto& [x, y, z] = points.positions[i];
       search.nearest(Eigen::Vector3f(x, y, z) + shift, 1, found);
       if (found.empty() || found.front().second > kReach2) continue;
       const Place& place = *places[found.front().first];
+
       const bool moved =
           place.change >= 0 &&
           comparison.changes[static_cast<std::size_t>(place.change)].kind == ChangeKind::kMoved;
       kind.values[i] = moved ? 6.0F : static_cast<float>(place.kind);
-      way.values[i] = place.distance.way_m;
+      way.values[i] = place.distance.shift_m;
     }
   });
+
   points.layers.push_back(std::move(kind));
   points.layers.push_back(std::move(way));
 }
@@ -107,12 +111,14 @@ core::Result<void> write_page(const std::filesystem::path& folder, const Compari
   const std::string still =
       "<p>This browser has no WebGL 2 or runs no scripts: top.png and iso.png show the map.</p>";
   const std::string title = markup(shown.before + " -> " + shown.after);
+
   std::string html =
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/>\n"
       "<meta name=\"generator\" content=\"plumbline compare\"/>\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n<title>" +
       title + "</title>\n<style>" + kPageStyle +
       "</style></head>\n<body>\n<nav><h1>What has changed</h1>\n<p>" + title + "</p>\n";
+
   html += list_html(comparison, shown, scene.z_up);
   html += fmt::format("<p>{}. In the median a shift of {:.1f} mm shows (95 %).</p>\n", markup(shown.placing),
                       1000.0 * comparison.median_limit_m);

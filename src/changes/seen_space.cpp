@@ -27,12 +27,14 @@ core::Result<std::optional<SeenSpace>> SeenSpace::open(const std::filesystem::pa
   space.rasters_.resize(count);
   space.camera_from_world_.resize(count);
   std::vector<std::optional<core::Error>> wrong(count);
+
   executor.parallel_for(count, [&](std::size_t v) {
     const auto cloud = views->read(v);
     if (!cloud) {
       wrong[v] = cloud.error();
       return;
     }
+
     const auto camera = maps::camera_of(run->stored().header.robots, views->robots[v]).color;
     space.rasters_[v] = cloud::depth_raster(**cloud, camera);
     space.camera_from_world_[v] =
@@ -61,6 +63,7 @@ std::vector<std::uint8_t> SeenSpace::looked_through(const std::vector<Eigen::Vec
 
   executor.parallel_for((points.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
     const std::size_t last = std::min(points.size(), (block + 1) * kBlock);
+
     for (std::size_t v = 0; v < limits.size(); ++v) {
       const Eigen::Matrix3f turn = camera_from_world_[v].rotation.cast<float>();
       const Eigen::Vector3f shift = camera_from_world_[v].translation.cast<float>();
@@ -74,7 +77,8 @@ std::vector<std::uint8_t> SeenSpace::looked_through(const std::vector<Eigen::Vec
 
   std::vector<std::uint8_t> result(points.size());
   for (std::size_t i = 0; i < points.size(); ++i)
-    result[i] = votes[i].free >= 2 && 2 * votes[i].free >= votes[i].surface ? 1 : 0;
+    result[i] =
+        votes[i].free > 0 && 2 * votes[i].free >= votes[i].surface + (votes[i].free == 1 ? 2 : 0) ? 1 : 0;
   return result;
 }
 

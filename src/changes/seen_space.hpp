@@ -14,13 +14,14 @@ namespace plumbline::changes {
 
 class SeenSpace {
  public:
-  /// Of the map at `input`; `world_from_map`: into the frame of the points that are asked for. None: it has
-  /// no store, or no clouds in it. Errors (kInput): damaged.
+  /// The space of the map at `input`; `world_from_map`: into the frame of the points that are asked for.
+  /// None: it has no store, or no clouds in it. Errors (kInput): damaged.
   static core::Result<std::optional<SeenSpace>> open(const std::filesystem::path& input,
                                                      const geometry::Rigid3& world_from_map,
                                                      const core::Executor& executor);
 
-  /// 1: at least two views look through the point, and no more than twice as many see a surface there.
+  /// 1: views look through the point, and no more than twice as many see a surface there; none if it is one
+  /// view.
   [[nodiscard]] std::vector<std::uint8_t> looked_through(const std::vector<Eigen::Vector3f>& points,
                                                          const core::Executor& executor) const;
   [[nodiscard]] double first_stamp_s() const { return first_stamp_s_; }

@@ -23,7 +23,7 @@ struct Color {
 /// By kind of place; colour-blind eyes tell them apart (Okabe and Ito 2008).
 constexpr std::array<Color, 6> kColors = {
     {{190, 190, 190}, {230, 159, 0}, {0, 114, 178}, {213, 94, 0}, {120, 150, 165}, {165, 140, 120}}};
-/// Of what moved, before and after.
+/// Colours of places that moved, before and after.
 constexpr Color kMovedFrom{240, 130, 170};
 constexpr Color kMovedTo{0, 158, 115};
 
@@ -52,16 +52,18 @@ cloud::CloudPtr cloud_of(const Comparison& comparison) {
 /// Columns of changes.ply.
 cloud::CloudColumns columns_of(const Comparison& comparison) {
   using Value = float (*)(const Place&);
+
   const std::vector<std::pair<const char*, Value>> values = {
       {"kind", [](const Place& p) { return static_cast<float>(p.kind); }},
       {"later", [](const Place& p) { return p.later ? 1.0F : 0.0F; }},
       {"change", [](const Place& p) { return static_cast<float>(p.change + 1); }},
-      {"distance", [](const Place& p) { return p.distance.way_m; }},
+      {"distance", [](const Place& p) { return p.distance.shift_m; }},
       {"limit", [](const Place& p) { return p.distance.limit_m; }},
       {"points_before", [](const Place& p) { return static_cast<float>(p.distance.before.count); }},
       {"points_after", [](const Place& p) { return static_cast<float>(p.distance.after.count); }},
       {"roughness_before", [](const Place& p) { return static_cast<float>(p.distance.before.sigma_m); }},
       {"roughness_after", [](const Place& p) { return static_cast<float>(p.distance.after.sigma_m); }}};
+
   cloud::CloudColumns columns;
   for (const auto& [name, value] : values) {
     cloud::CloudColumns::Other column{name, {}};
@@ -99,7 +101,7 @@ std::string csv_of(const Comparison& comparison, const Eigen::Vector3d& shift) {
                        three(c.box().center() + shift), box_text(c.before, shift), box_text(c.after, shift),
                        c.area_m2, c.volume_m3, moved || shifted ? three(way_of(c)) : ",,",
                        moved ? fmt::format("{:.1f}", c.turn_rad * 180.0 / M_PI) : "",
-                       shifted ? fmt::format("{:.4f}", c.way_m) : "",
+                       shifted ? fmt::format("{:.4f}", c.shift_m) : "",
                        shifted ? fmt::format("{:.4f}", c.limit_m) : "", c.sigma_m);
   }
   return csv;
@@ -139,19 +141,22 @@ std::string text_of(const Change& change) {
     const Eigen::Vector3d s = box.sizes();
     return fmt::format("{:.2f} x {:.2f} x {:.2f} m", s.x(), s.y(), s.z());
   };
+
   switch (change.kind) {
     case ChangeKind::kMoved: {
       const double turn = change.turn_rad * 180.0 / M_PI;
+
       return fmt::format("moved by {:.2f} m{}", way_of(change).norm(),
                          std::abs(turn) < 2.0 ? "" : fmt::format(", turned by {:.0f} degrees", turn));
     }
     case ChangeKind::kShifted:
-      return fmt::format("shifted by {:+.1f} mm (limit {:.1f} mm) over {:.2f} m2", 1000.0 * change.way_m,
+      return fmt::format("shifted by {:+.1f} mm (limit {:.1f} mm) over {:.2f} m2", 1000.0 * change.shift_m,
                          1000.0 * change.limit_m, change.area_m2);
     case ChangeKind::kAppeared:
     case ChangeKind::kVanished:
       break;
   }
+
   return fmt::format("{}: {}", name_of(change.kind), size(change.box()));
 }
 
@@ -171,6 +176,7 @@ core::Result<void> write_pictures(const std::filesystem::path& folder, const Com
   scene.cloud = cloud_of(comparison);
   scene.title = core::printable(shown.before + " -> " + shown.after);
   viz::SnapshotOptions options;
+
   options.up = shown.up;
   std::vector<viz::Snapshot> snapshots;
   for (const viz::View view : {viz::View::kTop, viz::View::kIso}) {
@@ -180,7 +186,7 @@ core::Result<void> write_pictures(const std::filesystem::path& folder, const Com
   if (auto drawn = viz::render_snapshots(scene, snapshots, executor); !drawn) return drawn;
 
   for (const Place& place : comparison.places)
-    scene.scalars.push_back(1000.0F * std::abs(place.distance.way_m));
+    scene.scalars.push_back(1000.0F * std::abs(place.distance.shift_m));
   scene.scalar_label = "distance (mm)";
   options.color = viz::ColorMode::kError;
   options.scalar_range = {0.0, std::max(10.0, 4000.0 * comparison.median_limit_m)};

@@ -160,7 +160,7 @@ def one_world(program, folder, number, changed, o):
     log = folder / "log.txt"
     film = [program, "synth", "home", "--layout", number, "--seed", number, "--width", 320, "--height", 240, "--fps", o.fps,
             "--frames", o.frames, "--path", "tour", "--reference-spacing", 0.02, "-q"]
-    if not (folder / "diff").exists():
+    if not (folder / "map_after" / "summary.json").exists():
         for day, more in (("before", []), ("after", ["--changes", 1000 + number] if changed else ["--robots", 2])):
             shutil.rmtree(folder / day, ignore_errors=True)
             run(film + more + ["-o", folder / day], log)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What has changed between two surfaces that were laid together (docs/guide/changes.md).
+// Changes between two surfaces that were laid together (docs/guide/changes.md).
 #include <Eigen/Geometry>
 #include <array>
 #include <functional>
@@ -22,7 +22,7 @@ struct ChangeOptions {
   void declare(core::OptionTable& table);
 };
 
-/// Of one place of a surface.
+/// State of one place of a surface.
 enum class PlaceKind : std::uint8_t { kSame, kShifted, kAppeared, kVanished, kNotSeenBefore, kNotSeenAfter };
 const char* name_of(PlaceKind kind);  ///< "same", "shifted", ..., "not seen after"
 
@@ -46,10 +46,10 @@ struct Change {
   double area_m2 = 0.0;    ///< of its places
   double volume_m3 = 0.0;  ///< of its box; of what shifted, its area times the way
   double sigma_m = 0.0;    ///< standard deviation of the way, or of the place
-  // Of what moved: p_after = after_from_before * p_before. Of what shifted: the median way along the normal.
+  // For things that moved: p_after = after_from_before * p_before. For a shift: the median along the normal.
   geometry::Rigid3 after_from_before;
   double turn_rad = 0.0;  ///< about the vertical, counter-clockwise
-  double way_m = 0.0;     ///< of what shifted signed: towards the side that it is seen from
+  double shift_m = 0.0;   ///< of what shifted signed: towards the side that it is seen from
   double limit_m = 0.0;   ///< of what shifted: the median of the 95 % detection limits
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< of what shifted
   [[nodiscard]] const Eigen::AlignedBox3d& box() const { return after.isEmpty() ? before : after; }

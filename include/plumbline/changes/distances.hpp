@@ -37,10 +37,10 @@ struct CylinderPoints {
 /// At one core point.
 struct Distance {
   CylinderPoints before, after;
-  float way_m =
+  float shift_m =
       std::numeric_limits<float>::quiet_NaN();  ///< along the normal; NaN: one cloud has too few points
   float limit_m = std::numeric_limits<float>::quiet_NaN();  ///< 95 % detection limit
-  [[nodiscard]] bool known() const { return std::isfinite(way_m); }
+  [[nodiscard]] bool known() const { return std::isfinite(shift_m); }
 };
 
 /// 1.96 (sqrt(s1^2 / n1 + s2^2 / n2) + registration), after Lague et al., equation 1.
@@ -54,8 +54,8 @@ std::vector<Distance> distances(const std::vector<Eigen::Vector3f>& cores,
                                 const core::Executor& executor);
 
 /// Standard deviation of the registration as places tell it: of the medians of blocks of half a metre, each
-/// facing one way, four fifths lie within 1.28 of it. What has changed may be a fifth of all surface. 0 if
-/// there are fewer than five blocks.
+/// facing one way, 65 % lie within 0.93 of it. A third of all surface may have changed. 0 if there are fewer
+/// than five blocks.
 double registration_sigma(const std::vector<Eigen::Vector3f>& cores,
                           const std::vector<Eigen::Vector3f>& normals,
                           const std::vector<Distance>& distances);

@@ -43,10 +43,10 @@ core::Result<MapView> view_of(const ExportRequest& request, const core::Executor
 
 /// The same with the cloud of a second map over it, moved into the first one's frame by cameras of the same
 /// stamp, else by places that both show, or of mere clouds by ICP; the scene says how and how well. Each has
-/// its distance to the other one as a layer. Errors: kUntrustworthy: nothing shows how the two lie; kInput of
-/// either.
+/// its distance to the other one as a layer. `by_cameras`: false of maps of different days. Errors:
+/// kUntrustworthy: nothing shows how the two lie; kInput of either.
 core::Result<MapView> view_of_two(const ExportRequest& first, const ExportRequest& second,
                                   const core::Executor& executor, core::Log& log,
-                                  const ExportProgress& progress);
+                                  const ExportProgress& progress, bool by_cameras = true);
 
 }  // namespace plumbline::exports

@@ -35,6 +35,7 @@ void add_compare(CLI::App& app, Session& session) {
   CLI::App* command =
       add_command(app, session, "compare", "Tell what has changed between two maps of a place",
                   [&session, state] { return run_compare(*state, session); });
+
   changes::CompareRequest& request = state->request;
   command->add_option("BEFORE", request.before, "Earlier map: a result folder, map.db, or a cloud file")
       ->required();
@@ -52,6 +53,7 @@ void add_compare(CLI::App& app, Session& session) {
           "(default: stamps)")
       ->type_name("stamps|given")
       ->transform(one_of(orders));
+
   command
       ->add_option("--points", request.points,
                    "Largest number of points of each map, thinned by voxels; 0: all (default: 1500000)")

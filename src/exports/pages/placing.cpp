@@ -193,11 +193,11 @@ std::optional<CommonPoses> common_poses(const std::vector<ExportPose>& first,
 }
 
 core::Result<Placement> place_second(const MapSource& one, const viewer::Points& first,
-                                     const MapSource& other, const viewer::Points& second) {
+                                     const MapSource& other, const viewer::Points& second, bool by_cameras) {
   const auto poses = one.poses(false);
   const auto other_poses = other.poses(false);
   std::optional<CommonPoses> common;
-  if (poses && other_poses) common = common_poses(*poses, *other_poses);
+  if (by_cameras && poses && other_poses) common = common_poses(*poses, *other_poses);
 
   if (common) {
     return Placement{common->first_from_second,

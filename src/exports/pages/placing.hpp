@@ -31,7 +31,8 @@ struct Placement {
 /// By cameras of the same stamp; else by places that both maps show (docs/method/merging.md), and then by ICP
 /// of the clouds. Where one of the two is only a cloud, from where the files lie, by ICP alone. `first`,
 /// `second`: their points. Errors: kUntrustworthy: nothing shows how they lie; those of reading the maps.
+/// `by_cameras`: cameras of the same stamp may be used.
 core::Result<Placement> place_second(const MapSource& one, const viewer::Points& first,
-                                     const MapSource& other, const viewer::Points& second);
+                                     const MapSource& other, const viewer::Points& second, bool by_cameras);
 
 }  // namespace plumbline::exports

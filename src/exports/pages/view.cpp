@@ -347,7 +347,7 @@ core::Result<MapView> view_of(const ExportRequest& request, const core::Executor
 
 core::Result<MapView> view_of_two(const ExportRequest& first, const ExportRequest& second,
                                   const core::Executor& executor, core::Log& log,
-                                  const ExportProgress& progress) {
+                                  const ExportProgress& progress, bool by_cameras) {
   auto one = MapSource::open(first, executor, log, progress);
   if (!one) return tl::unexpected(one.error());
   auto other = MapSource::open(second, executor, log, progress);
@@ -359,7 +359,7 @@ core::Result<MapView> view_of_two(const ExportRequest& first, const ExportReques
 
   viewer::Scene& scene = view->scene;
   if (added->second.name == scene.clouds.front().name) added->second.name += " (second)";
-  const auto placed = place_second(*one, scene.clouds.front(), *other, added->second);
+  const auto placed = place_second(*one, scene.clouds.front(), *other, added->second, by_cameras);
   if (!placed) return tl::unexpected(placed.error());
   move(added->second, placed->first_from_second);
   view->first_from_second = placed->first_from_second;

@@ -185,8 +185,8 @@ void add_measures(py::module_& module) {
              py::arg("reference"), py::arg("paths"), py::arg("options"), py::arg("threads"));
   module.def("write_export", &write_export, py::arg("input"), py::arg("output"), py::arg("format"),
              py::arg("what"), py::arg("options"), py::arg("replace"), py::arg("threads"));
-  module.def("compare", &compare, py::arg("before"), py::arg("after"), py::arg("output"), py::arg("given_order"),
-             py::arg("options"), py::arg("replace"), py::arg("threads"));
+  module.def("compare", &compare, py::arg("before"), py::arg("after"), py::arg("output"),
+             py::arg("given_order"), py::arg("options"), py::arg("replace"), py::arg("threads"));
   module.def("render", &render, py::arg("input"), py::arg("title"), py::arg("lines"), py::arg("options"),
              py::arg("picture"));
 }

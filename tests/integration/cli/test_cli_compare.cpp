@@ -11,8 +11,8 @@ namespace {
 class Compare : public ProgramTest {
  protected:
   void map(const std::string& world, const std::string& out) const {
-    const Outcome mapped = run("map \"synth:room?frames=60&fps=10&width=320&height=240" + world + "\" -o " + out +
-                               " -q --set output.views= --set output.pcd=off --set fuse.voxel=2cm");
+    const Outcome mapped = run("map \"synth:room?frames=60&fps=10&width=320&height=240" + world + "\" -o " +
+                               out + " -q --set output.views= --set output.pcd=off --set fuse.voxel=2cm");
     ASSERT_EQ(mapped.code, 0) << mapped;
   }
   /// A parcel less and a table elsewhere.
@@ -32,7 +32,8 @@ TEST_F(Compare, TellsWhatWentAndWhatMoved) {
   EXPECT_GE(summary["changes"]["vanished"], 1) << o;
   EXPECT_GT(summary["agreement"], 0.7);
   EXPECT_LT(summary["median_limit_m"], 0.01);
-  for (const char* file : {"changes.ply", "changes.csv", "changes.html", "top.png", "iso.png", "distance.png"})
+  for (const char* file :
+       {"changes.ply", "changes.csv", "changes.html", "top.png", "iso.png", "distance.png"})
     EXPECT_GT(slurp(path("diff") / file).size(), 100U) << file;
 
   // The table's way, 0.36 m, is in the list, and the page flies there.
@@ -61,8 +62,9 @@ TEST_F(Compare, CloudsTellShiftsAndNothingAboutFreeSpace) {
 
 TEST_F(Compare, RefusesWhatDoesNotFit) {
   map("", "a");
-  const Outcome mapped = run(
-      "map \"synth:office?frames=40&fps=10&width=320&height=240\" -o other -q --set output.views= --set output.pcd=off");
+  const Outcome mapped =
+      run("map \"synth:office?frames=40&fps=10&width=320&height=240\" -o other -q --set output.views= --set "
+          "output.pcd=off");
   ASSERT_EQ(mapped.code, 0) << mapped;
   const Outcome o = run("compare a other -o diff");
   EXPECT_EQ(o.code, 4) << o;

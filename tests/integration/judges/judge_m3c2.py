@@ -83,11 +83,11 @@ def main(program, folder):
     limit = 1.96 * (np.sqrt(before[:, 2] ** 2 / before[:, 0] + after[:, 2] ** 2 / after[:, 0]) + summary["registration_sigma_m"])
     known = np.isfinite(distance) & np.isfinite(places["distance"])
     off = [1000 * float(np.quantile(np.abs(a[known] - places[k][known]), 0.99)) for a, k in ((distance, "distance"), (limit, "limit"))]
-    wall = known & (axes[:, 1] < -0.9) & (cores[:, 1] > 2.9)
+    wall = known & (axes[:, 1] > 0.9) & (cores[:, 1] > 2.9)
     way = 1000 * float(np.median(places["distance"][wall]))
     print(f"{known.sum()} places; 99 % of distances within {off[0]:.4f} mm, of limits within {off[1]:.4f} mm; the wall {way:+.2f} mm")
     wrong = max(off) > 0.1 or known.sum() < 5000 or np.mean(np.isfinite(distance) != np.isfinite(places["distance"])) > 0.001
-    return int(wrong or abs(way - 12.0) > 3.0)
+    return int(wrong or abs(way + 12.0) > 3.0)
 
 
 if __name__ == "__main__":
