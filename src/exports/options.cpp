@@ -44,6 +44,7 @@ void ExportOptions::declare(core::OptionTable& table) {
   table.numbers("section", section, 0, {-kFar_m, kFar_m}, "m",
                 "Draw a vertical section along the line x,y,x,y instead of the plan");
   constexpr auto kMayBeEmpty = core::EmptyValue::kAllowed;
+
   table.choice("paper", paper, {"auto", "A4", "A3", "A2", "A1", "A0"},
                "Paper of a plan; auto: A3, or the next that holds it");
   table.text("scale", scale,
@@ -51,12 +52,14 @@ void ExportOptions::declare(core::OptionTable& table) {
   table.text("title", title, "Title of a plan; empty: the map's name", kMayBeEmpty);
   table.text("client", client, "Client, for a plan's title block; empty: none", kMayBeEmpty);
   table.text("address", address, "Address, for a plan's title block; empty: none", kMayBeEmpty);
+
   table.text("date", date,
              "Date of the recording, for a plan's title block; empty: that of its stamps, if they tell one",
              kMayBeEmpty);
   table.text("title_block", title_block, "YAML file with texts of a plan's title block; empty: none",
              kMayBeEmpty);
   table.choice("decimal", decimal, {"point", "comma"}, "Decimal sign of a plan");
+
   table.text(
       "without", without,
       "Layers that a plan leaves out: wall, patt, assm, door, glaz, area, furn, dims, grid, anno, path; none",

@@ -75,6 +75,7 @@ core::Result<ReportSummary> write_report(const ReportRequest& request, const cor
 
   const auto head = head_html(*data, request);
   if (!head) return tl::unexpected<core::Error>(head.error());
+
   const std::string page = page_html(
       "Plumbline report: " + (request.title.empty() ? data->name : request.title), *head,
       {{"map", "The map to walk through", std::move(*viewer)},

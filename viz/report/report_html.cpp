@@ -130,8 +130,10 @@ std::string page_html(const std::string& title, const std::string& head_html,
     (section.behind ? behind : body) += fmt::format("<section id=\"{}\"><h2>{}</h2>\n{}</section>\n",
                                                     section.id, markup_text(section.title), section.html);
   }
+
   if (!behind.empty())
     body += "<details class=\"made\"><summary>How it was made</summary>\n" + behind + "</details>\n";
+
   return fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/>\n"
       "<meta name=\"generator\" content=\"{}\"/>\n"

@@ -28,8 +28,10 @@ std::vector<DimensionRun> runs_of(const WallRoom& room) {
   std::vector<DimensionRun> runs;
   const std::size_t count = room.outline.size();
   bool open = true;
+
   for (std::size_t i = 0; i < count; ++i) {
     const Eigen::Vector2d &a = room.outline[i], &b = room.outline[(i + 1) % count];
+
     if (room.side(i) == RoomSide::kLimit) {
       open = true;
     } else if (!open && continues(runs.back(), b)) {
@@ -112,46 +114,55 @@ std::vector<double> jambs_along(const DimensionRun& run, const std::vector<WallD
   return places;
 }
 
-/// Draws dimensions, each text over its line, else beside it with a leader.
+/// Draws dimensions, then their texts over their lines, else beside them with a leader: a text must not lie
+/// on the lines of any of them.
 class DimensionChain {
  public:
   DimensionChain(const PlanStyle& style, std::size_t layer, Drawing& drawing)
-      : style_(style), layer_(layer), drawing_(drawing), places_(drawing) {}
+      : style_(style), layer_(layer), drawing_(drawing) {}
 
   void draw(const Eigen::Vector2d& from, const Eigen::Vector2d& to, const Eigen::Vector2d& beside) {
     DrawnDimension d{layer_, from, to, beside, (to - from).norm() / style_.unit, {}, false};
-    const double height = 1.8 * style_.mm;
     const Eigen::Vector2d along = (to - from).normalized();
-    const Eigen::Vector2d out =
-        beside.norm() > 0.0 ? beside.normalized() : Eigen::Vector2d(-along.y(), along.x());
-    const Eigen::Vector2d middle = 0.5 * (from + to) + beside;
-    d.label = {layer_, middle, height, std::atan2(along.y(), along.x()), style_.number(d.measure_m, 3)};
+    d.label = {layer_, 0.5 * (from + to) + beside, 1.8 * style_.mm, std::atan2(along.y(), along.x()),
+               style_.number(d.measure_m, 3)};
+    dimensions_.push_back(d);
+  }
 
-    const double width = d.label.width_m(), length = (to - from).norm();
-    for (const DrawnLine& line : lines_of(d)) places_.add(line);
-    std::vector<Eigen::Vector2d> near, far;
-    for (const double share : {0.0, 0.15, -0.15, 0.3, -0.3}) {
-      if (width + 2.0 * std::abs(share) * length > 0.95 * length) continue;
-      for (const double side : {0.95, -0.95})
-        near.emplace_back(middle + share * length * along + side * height * out);
+  void place_texts() {
+    LabelPlaces places(drawing_);
+    for (const DrawnDimension& d : dimensions_) {
+      for (const DrawnLine& line : lines_of(d)) places.add(line);
     }
 
-    if (!places_.place(d.label, near)) {
-      for (const Eigen::Vector2d& at : places_around(middle, style_.mm, 45.0 * style_.mm)) {
-        if (places_.is_free(middle, at)) far.push_back(at);
+    for (DrawnDimension& d : dimensions_) {
+      const Eigen::Vector2d middle = d.label.at, along = (d.to - d.from).normalized();
+      const Eigen::Vector2d across(-along.y(), along.x());
+      const double width = d.label.width_m(), length = (d.to - d.from).norm();
+      std::vector<Eigen::Vector2d> near, far;
+      for (const double share : {0.0, 0.12, -0.12, 0.25, -0.25, 0.36, -0.36}) {
+        if (width + 2.0 * std::abs(share) * length > 0.95 * length) continue;
+        for (const double side : {0.95, -0.95})
+          near.emplace_back(middle + share * length * along + side * d.label.height_m * across);
       }
-      d.leader = true;
-      places_.place(d.label, far);
-      places_.add(lines_of(d).back());
+
+      if (!places.place(d.label, near)) {
+        for (const Eigen::Vector2d& at : places_around(middle, style_.mm, 45.0 * style_.mm)) {
+          if (places.is_free(middle, at)) far.push_back(at);
+        }
+        places.place(d.label, far);
+        d.leader = true;
+        places.add(lines_of(d).back());
+      }
+      drawing_.dimensions.push_back(d);
     }
-    drawing_.dimensions.push_back(d);
   }
 
  private:
   const PlanStyle& style_;
   std::size_t layer_;
   Drawing& drawing_;
-  LabelPlaces places_;
+  std::vector<DrawnDimension> dimensions_;
 };
 
 }  // namespace
@@ -163,6 +174,7 @@ void draw_dimensions(const WallPlan& plan, const PlanStyle& style, const PlanLay
   DimensionChain chain(style, layers.dimensions, drawing);
   std::vector<bool> used(plan.doors.size(), false);
   std::vector<DimensionRun> done;
+
   for (const DimensionRun& run : all_runs(plan, style.unit)) {
     std::vector<double> places = jambs_along(run, plan.doors, used);
     const bool with_openings = !places.empty();
@@ -185,6 +197,7 @@ void draw_dimensions(const WallPlan& plan, const PlanStyle& style, const PlanLay
   for (std::size_t i = 0; i < plan.doors.size(); ++i) {
     if (!used[i]) chain.draw(plan.doors[i].jambs[0], plan.doors[i].jambs[1], Eigen::Vector2d::Zero());
   }
+  chain.place_texts();
 }
 
 }  // namespace plumbline::exports

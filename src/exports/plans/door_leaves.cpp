@@ -13,7 +13,7 @@
 namespace plumbline::exports {
 namespace {
 
-/// What stands upright beside an opening and is no wall: places and normals along and in front of it.
+/// A point that stands upright beside an opening and is no wall: place and normal along and in front of it.
 struct Upright {
   Eigen::Vector2d at, normal;
   double z;
@@ -51,6 +51,7 @@ double filled_share(const std::vector<Upright>& points, const Eigen::Vector2d& h
   std::array<std::pair<double, double>, kMostBins> heights;
   heights.fill({1e300, -1e300});
   const Eigen::Vector2d across(-way.y(), way.x());
+
   for (const Upright& p : points) {
     const double r = way.dot(p.at - hinge);
     if (r < 0.0 || r >= kMostBins * kBin_m || std::abs(across.dot(p.at - hinge)) > kOff_m ||
@@ -95,10 +96,12 @@ void find_leaves(const cloud::Cloud& cloud, double floor_m, const std::vector<Wa
                  std::vector<WallDoor>& doors) {
   constexpr double kLeastFilled = 0.7, kWidest_m = 1.3;
   constexpr int kStep_deg = 2, kFirst_deg = 16, kLast_deg = 170;
+
   for (WallDoor& door : doors) {
     if (door.kind != OpeningKind::kDoor || door.width_m > kWidest_m) continue;
     const auto points = upright_beside(points_near(cloud, floor_m, door, door.width_m + 0.3), door, walls);
     double best = kLeastFilled;
+
     for (int hinge = 0; hinge < 2; ++hinge) {
       for (const bool front : {true, false}) {
         const Eigen::Vector2d at(hinge == 0 ? 0.0 : door.width_m, front ? 0.0 : -door.depth_m());
@@ -106,6 +109,7 @@ void find_leaves(const cloud::Cloud& cloud, double floor_m, const std::vector<Wa
           const double angle = degrees * M_PI / 180.0;
           const Eigen::Vector2d way((hinge == 0 ? 1.0 : -1.0) * std::cos(angle),
                                     (front ? 1.0 : -1.0) * std::sin(angle));
+
           const double filled = filled_share(points, at, way, door.width_m);
           if (filled <= best) continue;
           best = filled;
@@ -121,6 +125,7 @@ std::vector<WallDoor> windows_of(const cloud::Cloud& cloud, double floor_m, doub
                                  std::vector<WallLine>& walls) {
   constexpr double kLowestSill_m = 0.05;
   std::vector<WallDoor> windows;
+
   for (WallLine& wall : walls) {
     for (WallOpening& gap : wall.gaps) {
       WallDoor window;
@@ -144,6 +149,7 @@ std::vector<WallDoor> windows_of(const cloud::Cloud& cloud, double floor_m, doub
       if (!again) windows.push_back(window);
     }
   }
+
   find_far_sides(walls, windows);
   return windows;
 }

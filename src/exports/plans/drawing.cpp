@@ -39,11 +39,13 @@ std::string svg_path(const DrawnLine& line, const DrawingSheet& sheet) {
 
 std::string svg_text(const Drawing& drawing) {
   const DrawingSheet& sheet = drawing.sheet;
+
   std::string out = fmt::format(
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" "
       "width=\"{0:.2f}mm\" height=\"{1:.2f}mm\" viewBox=\"0 0 {0:.2f} {1:.2f}\">\n"
       "<title>{2}</title>\n<desc>scale 1:{3}; {4:.6f} {5:.6f} (m) is at the lower left",
       sheet.width_mm, sheet.height_mm, escaped(drawing.title), sheet.scale, sheet.low.x(), sheet.low.y());
+
   for (const std::string& note : drawing.notes) out += "; " + escaped(note);
   out += "</desc>\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n";
 

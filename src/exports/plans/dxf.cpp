@@ -198,6 +198,7 @@ void put_area(DxfText& dxf, const DrawnArea& area, const std::string& layer) {
     dxf.put(72, 0);
     dxf.put(73, 1);
     dxf.put(93, static_cast<int>(area.rings[i].size()));
+
     for (const Eigen::Vector2d& p : area.rings[i]) {
       dxf.put(10, p.x());
       dxf.put(20, p.y());
@@ -239,7 +240,7 @@ void put_dimension(DxfText& dxf, const DrawnDimension& dimension, std::size_t nu
   dxf.put(2, fmt::format("*D{}", number));
   dxf.point(10, dimension.to + dimension.beside);
   dxf.point(11, dimension.label.at);
-  dxf.put(70, 1 + 32 + 128);  // aligned, its block is its own, its text was placed
+  dxf.put(70, 32 + 128);  // its block is its own, its text was placed
   dxf.put(1, dimension.label.text);
   dxf.put(71, 5);
   dxf.put(42, dimension.measure_m);
@@ -247,6 +248,9 @@ void put_dimension(DxfText& dxf, const DrawnDimension& dimension, std::size_t nu
   dxf.put(100, "AcDbAlignedDimension");
   dxf.point(13, dimension.from);
   dxf.point(14, dimension.to);
+  const Eigen::Vector2d way = dimension.to - dimension.from;
+  dxf.put(50, std::atan2(way.y(), way.x()) * 180.0 / M_PI);
+  dxf.put(100, "AcDbRotatedDimension");
 }
 
 void put_entities(DxfText& dxf, const Drawing& drawing) {
@@ -272,6 +276,7 @@ core::Result<void> write_dxf(const std::filesystem::path& file, const Drawing& d
   dxf.put(0, "SECTION");
   dxf.put(2, "TABLES");
   put_viewport(dxf, 0.5 * (low + high), 1.1 * std::max(1.0, (high - low).maxCoeff()));
+
   put_line_types(dxf, drawing.sheet.mm());
   put_layers(dxf, drawing);
   put_style_tables(dxf);
@@ -285,7 +290,7 @@ core::Result<void> write_dxf(const std::filesystem::path& file, const Drawing& d
   dxf.put(0, "EOF");
 
   core::OutputFile out(file);
-  out.write(dxf_header(dxf.next_handle(), drawing.notes, low, high, dimension_text(drawing)));
+  out.write(dxf_header(dxf.next_handle(), drawing, low, high, dimension_text(drawing)));
   out.write(dxf.text());
   return out.commit();
 }

@@ -207,10 +207,10 @@ void put_objects(DxfText& dxf) {
   dxf.put(0, "ENDSEC");
 }
 
-std::string dxf_header(const std::string& next_handle, const std::vector<std::string>& notes,
-                       const Eigen::Vector2d& low, const Eigen::Vector2d& high, double text_m) {
+std::string dxf_header(const std::string& next_handle, const Drawing& drawing, const Eigen::Vector2d& low,
+                       const Eigen::Vector2d& high, double text_m) {
   DxfText dxf;
-  for (const std::string& note : notes) dxf.put(999, note);
+  for (const std::string& note : drawing.notes) dxf.put(999, note);
   dxf.put(0, "SECTION");
   dxf.put(2, "HEADER");
 
@@ -237,6 +237,22 @@ std::string dxf_header(const std::string& next_handle, const std::vector<std::st
     variable(name);
     dxf.put(40, height * text_m);
   }
+
+  // LibreCAD prints the sheet from these.
+  const DrawingSheet& sheet = drawing.sheet;
+
+  for (const auto& [name, place] :
+       {std::pair("$PLIMMIN", Eigen::Vector2d(0.0, 0.0)),
+        std::pair("$PLIMMAX", Eigen::Vector2d(1e-3 * sheet.width_mm, 1e-3 * sheet.height_mm)),
+        std::pair("$PINSBASE", Eigen::Vector2d(-sheet.low / sheet.scale))}) {
+    variable(name);
+    dxf.put(10, place.x());
+    dxf.put(20, place.y());
+    if (std::string(name) == "$PINSBASE") dxf.put(30, 0.0);
+  }
+  variable("$PSVPSCALE");
+
+  dxf.put(40, 1.0 / sheet.scale);
   variable("$DIMTAD");
   dxf.put(70, 1);
   variable("$LTSCALE");

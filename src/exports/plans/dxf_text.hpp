@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "plans/drawing.hpp"
+
 namespace plumbline::exports {
 
 /// Pairs of group code and value.
@@ -31,7 +33,8 @@ class DxfText {
   [[nodiscard]] std::string next_handle() const { return fmt::format("{:X}", next_); }
   [[nodiscard]] const std::string& text() const { return text_; }
 
-  /// What is not ASCII, as \\U+XXXX; longer characters than those of 16 bits become a question mark.
+  /// The text with all that is not ASCII as \\U+XXXX; longer characters than those of 16 bits become a
+  /// question mark.
   static std::string encoded(const std::string& utf8);
 
  private:
@@ -55,8 +58,8 @@ void put_viewport(DxfText& dxf, const Eigen::Vector2d& middle, double height);
 void put_style_tables(DxfText& dxf);
 /// Section of the dictionaries, which ends the file.
 void put_objects(DxfText& dxf);
-/// The head. `text_m`: height of dimensions' texts.
-std::string dxf_header(const std::string& next_handle, const std::vector<std::string>& notes,
-                       const Eigen::Vector2d& low, const Eigen::Vector2d& high, double text_m);
+/// The head, with the place of the sheet on the paper. `text_m`: height of dimensions' texts.
+std::string dxf_header(const std::string& next_handle, const Drawing& drawing, const Eigen::Vector2d& low,
+                       const Eigen::Vector2d& high, double text_m);
 
 }  // namespace plumbline::exports

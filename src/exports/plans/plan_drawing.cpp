@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "plans/room_cells.hpp"
 
@@ -52,6 +53,19 @@ void draw_opening(const WallDoor& door, const PlanLayers& layers, double unit, D
                              (door.opens_front ? -along.norm() : along.norm()) * behind});
 }
 
+/// True if an outline lies in no room and behind a wall, such as what is seen through a window.
+bool is_behind_walls(const std::vector<Eigen::Vector2d>& outline, const WallPlan& plan) {
+  constexpr double kFarthest_m = 0.8;
+  const Eigen::Vector2d middle = std::accumulate(outline.begin(), outline.end(), Eigen::Vector2d(0.0, 0.0)) /
+                                 static_cast<double>(outline.size());
+  const bool in_room = std::any_of(plan.rooms.begin(), plan.rooms.end(),
+                                   [&](const WallRoom& room) { return is_inside(room.outline, middle); });
+  return !in_room && std::any_of(plan.walls.begin(), plan.walls.end(), [&](const WallLine& wall) {
+    const double behind = wall.offset_m - wall.normal.dot(middle), s = wall.along().dot(middle);
+    return behind > 0.0 && behind < kFarthest_m && s > wall.s0 && s < wall.s1;
+  });
+}
+
 /// True if the text lies in the room.
 bool is_in_room(const DrawnText& text, const WallRoom& room) {
   const auto box = box_of(text);
@@ -83,7 +97,9 @@ std::string PlanStyle::number(double value, int decimals) const {
 }
 
 void draw_walls(const WallPlan& plan, const PlanStyle& style, const PlanLayers& layers, Drawing& drawing) {
-  for (const auto& outline : plan.furniture) drawing.lines.push_back({layers.furniture, outline, true});
+  for (const auto& outline : plan.furniture) {
+    if (!is_behind_walls(outline, plan)) drawing.lines.push_back({layers.furniture, outline, true});
+  }
   for (WallSolid& solid : wall_solids(plan, style.unit)) {
     for (const auto& ring : solid.rings)
       drawing.lines.push_back(
@@ -93,6 +109,7 @@ void draw_walls(const WallPlan& plan, const PlanStyle& style, const PlanLayers& 
 
   for (const WallLine& wall : plan.walls) {
     for (const auto& [a, b] : solid_pieces(wall)) drawing.line(layers.wall, wall.at(a), wall.at(b));
+
     for (const WallOpening& gap : wall.gaps) {
       const Eigen::Vector2d middle = wall.at(0.5 * (gap.s0 + gap.s1));
       const bool window = std::any_of(plan.doors.begin(), plan.doors.end(), [&](const WallDoor& door) {
@@ -125,6 +142,7 @@ std::vector<std::string> opening_numbers(const WallPlan& plan) {
 void draw_labels(const WallPlan& plan, const PlanStyle& style, const PlanLayers& layers, Drawing& drawing) {
   LabelPlaces places(drawing);
   const std::vector<std::string> numbers = opening_numbers(plan);
+
   const auto with_leader = [&](DrawnText& text, const Eigen::Vector2d& anchor, double farthest_mm) {
     for (const Eigen::Vector2d& at : places_around(anchor, 1.5 * style.mm, farthest_mm * style.mm)) {
       text.at = at;
@@ -145,6 +163,7 @@ void draw_labels(const WallPlan& plan, const PlanStyle& style, const PlanLayers&
     const std::string area = fmt::format("{}{} m²", room.closed ? "" : "≥ ", style.number(room.area_m2, 2));
     DrawnText text{layers.area, room.label, 3.0 * style.mm, 0.0, fmt::format("{}: {}", i + 1, area)};
     bool placed = false;
+
     for (const double height_mm : {3.0, 2.2, 1.8}) {
       text.height_m = height_mm * style.mm;
       std::vector<Eigen::Vector2d> inside;
@@ -174,8 +193,10 @@ std::vector<SheetTable> tables_of(const WallPlan& plan, const PlanStyle& style) 
   const auto known = [&](double value) { return value > 0.0 ? style.number(value, 2) : std::string("–"); };
   std::vector<SheetTable> tables(2);
   tables[0] = {"Rooms", {{"No.", 9}, {"Area (m²)", 21}, {"Perimeter (m)", 23}, {"Height (m)", 34}}, {}};
+
   for (std::size_t i = 0; i < plan.rooms.size(); ++i) {
     const WallRoom& room = plan.rooms[i];
+
     const std::string range = room.height_m > 0.0
                                   ? fmt::format(" ({} to {})", style.number(room.heights_m[0], 2),
                                                 style.number(room.heights_m[1], 2))
@@ -196,6 +217,7 @@ std::vector<SheetTable> tables_of(const WallPlan& plan, const PlanStyle& style) 
     tables[1].rows.push_back({numbers[i], kKinds[static_cast<std::size_t>(door.kind)],
                               style.number(door.width_m, 3), known(door.sill_m), known(door.head_m)});
   }
+
   tables.erase(
       std::remove_if(tables.begin(), tables.end(), [](const SheetTable& t) { return t.rows.empty(); }),
       tables.end());

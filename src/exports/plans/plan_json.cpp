@@ -49,8 +49,10 @@ std::string plan_json(const WallPlan& plan, const std::string& frame, double flo
 
   json["openings"] = PlanJson::array();
   const std::vector<std::string> numbers = opening_numbers(plan);
+
   for (std::size_t i = 0; i < plan.doors.size(); ++i) {
     const WallDoor& door = plan.doors[i];
+
     json["openings"].push_back(
         {{"number", numbers[i]},
          {"kind", door.kind == OpeningKind::kDoor      ? "door"

@@ -99,7 +99,7 @@ core::Result<Drawing> storey_sheet(MapSource& source, const std::string& storey,
   facts.georeferenced = world.has_value();
   const std::string frame =
       world ? fmt::format("{} (EPSG:{}); x east, y north, metres", world->name, world->epsg)
-            : source.frame_text();
+            : source.frame_text().substr(source.frame_text().rfind("frame: ", 0) == 0 ? 7 : 0);
   if (auto told = add_facts(source,
                             {{"Storey", storey},
                              {"Cut at", fmt::format("{:g} m over the floor", source.options().cut_m)},
@@ -112,7 +112,7 @@ core::Result<Drawing> storey_sheet(MapSource& source, const std::string& storey,
   return sheet_of(source.options(), facts, plan, unit,
                   [&](const PlanStyle& style, const PlanLayers& layers, Drawing& drawing) {
                     drawing.title = fmt::format("{}: plan at {:g} m", source.name(), source.options().cut_m);
-                    drawing.notes.push_back((world ? "frame: " : "") + frame);
+                    drawing.notes.push_back("frame: " + frame);
                     draw_walls(plan, style, layers, drawing);
                     draw_dimensions(plan, style, layers, drawing);
                     draw_labels(plan, style, layers, drawing);
@@ -130,9 +130,11 @@ core::Result<Drawing> storey_sheet(MapSource& source, const std::string& storey,
 core::Result<void> add_facts(const MapSource& source, const TitleRows& rows, SheetFacts& facts) {
   const ExportOptions& o = source.options();
   TitleRows told{{"Title", o.title}, {"Client", o.client}, {"Address", o.address}, {"Recorded", o.date}};
+
   if (!o.title_block.empty()) {
     const auto file = core::read_yaml(o.title_block);
     if (!file) return tl::unexpected(file.error());
+
     for (const auto& [key, node] : file->entries) {
       std::string name = key;
       if (!name.empty()) name[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(name[0])));
@@ -159,6 +161,7 @@ core::Result<Drawing> sheet_of(const ExportOptions& options, const SheetFacts& f
   if (!scale) return tl::unexpected(scale.error());
   const SheetOptions wanted{options.paper == "auto" ? "" : options.paper, *scale};
   Eigen::Vector2d size = Eigen::Vector2d::Zero();
+
   for (const int of : sheet_scales(wanted)) {
     Drawing drawing;
     drawing.sheet.scale = of;
@@ -176,6 +179,7 @@ core::Result<Drawing> sheet_of(const ExportOptions& options, const SheetFacts& f
     };
     draw(style, layers, drawing);
     drawing.remove_layers(is_unwanted);
+
     const auto [low, high] = drawing.bounds();
     size = high - low;
     if (!put_on_sheet(wanted, facts, style, layers, tables_of(plan, style), drawing)) continue;
@@ -183,6 +187,7 @@ core::Result<Drawing> sheet_of(const ExportOptions& options, const SheetFacts& f
     drawing.break_lines();
     return drawing;
   }
+
   return core::usage_error(fmt::format(
       "--scale {}: what is drawn has {:.1f} x {:.1f} m, which {} does not hold beside its tables; "
       "leave --scale or --paper out",
@@ -193,6 +198,7 @@ PlanPage plan_page(const WallPlan& plan, const std::string& name) {
   constexpr double kWidest_mm = 182.0, kTallest_mm = 150.0, kAround_mm = 3.0;
   PlanPage page;
   Drawing drawing;
+
   for (const int scale : sheet_scales({})) {
     drawing = {};
     drawing.title = name;
@@ -225,6 +231,7 @@ core::Result<std::vector<Drawing>> plan_sheets(MapSource& source, const std::opt
   const ExportOptions& o = source.options();
   const auto cloud = source.cloud();
   if (!cloud) return tl::unexpected(cloud.error());
+
   const std::size_t storeys =
       o.storey < 0 && o.box.empty() && o.z.empty() ? floor_heights(*(*cloud)->cloud).size() : 1;
   if (storeys < 2) {
@@ -235,6 +242,7 @@ core::Result<std::vector<Drawing>> plan_sheets(MapSource& source, const std::opt
 
   // Storeys without walls, such as a landing, are told and left out.
   core::Error last;
+
   for (std::size_t k = 0; k < storeys; ++k) {
     ExportRequest request = source.request();
     request.options.storey = static_cast<int>(k);
@@ -244,6 +252,7 @@ core::Result<std::vector<Drawing>> plan_sheets(MapSource& source, const std::opt
     auto storey = MapSource::open(request, source.executor(), source.log(), progress);
     if (!storey) return tl::unexpected(storey.error());
     auto page = storey_sheet(*storey, std::to_string(k), world, summary);
+
     if (!page && page.error().kind != core::ErrorKind::kInput) return tl::unexpected(page.error());
     if (!page) {
       summary.notes.push_back(fmt::format("storey {} is left out: {}", k, page.error().message));

@@ -174,6 +174,7 @@ std::vector<PlanOutline> outlines_of(const std::vector<PlanSegment>& limits) {
     if (used[first]) continue;
     PlanOutline outline;
     std::size_t at = first;
+
     while (!used[at]) {
       used[at] = true;
       outline.push_back(limits[at][0]);
@@ -232,6 +233,7 @@ std::vector<SidePart> side_parts(const PlanSegment& side, const RoomWalls& of) {
   constexpr double kNone_m = 0.03;
   const double length = length_of(side);
   std::vector<SidePart> parts;
+
   const auto fill = [&](const std::vector<WallOpening>& found, double from, double to, RoomSide kind,
                         const auto& rest) {
     for (const WallOpening& part : found) {
@@ -354,10 +356,10 @@ std::vector<WallRoom> rooms_in(const Eigen::AlignedBox2d& box, const std::vector
                                const std::vector<WallLine>& closings, const std::vector<WallDoor>& doors,
                                const FreeSpace& space) {
   const std::vector<PlanOutline> openings = openings_of(doors);
-  const std::vector<RoomCell> cells = cells_of(box, walls, openings, space);
-  const std::vector<CellBorder> borders = borders_of(cells);
   std::vector<WallLine> all = walls;
   all.insert(all.end(), closings.begin(), closings.end());
+  const std::vector<RoomCell> cells = cells_of(box, all, openings, space);
+  const std::vector<CellBorder> borders = borders_of(cells);
 
   const std::vector<double> walled = walled_shares(borders, all, openings);
   const std::vector<bool> inside = inside_cells(cells, borders, walled, walls);

@@ -74,6 +74,7 @@ core::Result<Drawing> section_sheet(MapSource& source, ExportSummary& summary) {
       !told)
     return tl::unexpected(told.error());
   summary.notes.push_back(fmt::format("a section {:.2f} m long", (to - from).norm()));
+
   return sheet_of(source.options(), facts, {}, 1.0,
                   [&](const PlanStyle&, const PlanLayers& layers, Drawing& drawing) {
                     draw_cells(cells, layers.wall, drawing);

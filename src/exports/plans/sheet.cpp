@@ -148,29 +148,31 @@ std::vector<std::pair<std::string, std::string>> legend_of(const Drawing& drawin
   return legend;
 }
 
-void draw_legend(Drawing& drawing, SheetWriter& writer, const PlanLayers& layers, double x, double y,
+void draw_legend(Drawing& drawing, SheetWriter& writer, std::size_t layer, double x, double y,
                  const std::vector<std::pair<std::string, std::string>>& legend) {
   for (const auto& [sign, text] : legend) {
     const double middle = y - 0.5 * kLine_mm, low = middle - 1.2, high = middle + 1.2;
     const std::vector<Eigen::Vector2d> ring{writer.at(x, low), writer.at(x + 14, low),
                                             writer.at(x + 14, high), writer.at(x, high)};
     const Eigen::Vector2d side = ring[1] - ring[0], up = ring[3] - ring[0];
+
     if (sign == "wall") {
-      drawing.areas.push_back({layers.hatch, {ring}, 1.2 * drawing.sheet.mm()});
-      drawing.lines.push_back({layers.wall, ring, true});
+      drawing.areas.push_back({layer, {ring}, 1.2 * drawing.sheet.mm()});
+      drawing.lines.push_back({layer, ring, true});
     } else if (sign == "assumed") {
-      drawing.lines.push_back({layers.assumed, ring, true, false, true});
-      drawing.line(layers.wall, ring[0], ring[1]);
+      drawing.lines.push_back({layer, ring, true, false, true});
+      drawing.line(layer, ring[0], ring[1]);
     } else if (sign == "window") {
-      drawing.symbols.push_back({layers.glazing, 1, ring[0], side, up});
+      drawing.symbols.push_back({layer, 1, ring[0], side, up});
     } else if (sign == "furniture") {
-      drawing.lines.push_back({layers.furniture, ring, true});
+      drawing.lines.push_back({layer, ring, true});
     } else if (sign == "door") {
       const Eigen::Vector2d hinge = writer.at(x + 5.0, middle - 1.5);
-      drawing.symbols.push_back({layers.door, 0, hinge, 0.22 * side, {0.0, 0.22 * side.x()}});
+      drawing.symbols.push_back({layer, 0, hinge, 0.22 * side, {0.0, 0.22 * side.x()}});
     } else {
-      drawing.line(layers.area, writer.at(x, middle), writer.at(x + 14, middle), true);
+      drawing.line(layer, writer.at(x, middle), writer.at(x + 14, middle), true);
     }
+
     writer.text(x + 17.0, middle, text);
     y -= kLine_mm + 0.6;
   }
@@ -255,6 +257,7 @@ SheetColumn column_of(const SheetFacts& facts, const Drawing& drawing, const Pla
   // Tables fill the columns from the right, the others from edge to edge.
   const double inner = drawing.sheet.height_mm - 2.0 * kMargin_mm;
   double room = inner - column.foot_mm;
+
   for (const SheetTable& table : tables) {
     double need = height_of(table) + 2.0 * kHead_mm;
     while (need > room) {
@@ -265,6 +268,7 @@ SheetColumn column_of(const SheetFacts& facts, const Drawing& drawing, const Pla
     }
     room -= need;
   }
+
   return column;
 }
 
@@ -326,12 +330,13 @@ bool put_on_sheet(const SheetOptions& options, const SheetFacts& facts, const Pl
       writer.line(right, kMargin_mm, right, top);
       const double title_mm = draw_title(writer, x, kMargin_mm, column.title);
       draw_scale(drawing, writer, style, facts.georeferenced, x, kMargin_mm + title_mm + 11.0);
-      draw_legend(drawing, writer, layers, x, kMargin_mm + column.foot_mm - 2.0, column.legend);
+      draw_legend(drawing, writer, layers.anno, x, kMargin_mm + column.foot_mm - 2.0, column.legend);
       draw_tables(writer, drawing.sheet, tables, x, column.foot_mm);
       draw_coordinates(drawing, writer, layers, right, top);
       return true;
     }
   }
+
   return false;
 }
 

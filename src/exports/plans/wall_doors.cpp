@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <optional>
 
 #include "plans/wall_steps.hpp"
 
@@ -246,6 +247,7 @@ void find_far_sides(const std::vector<WallLine>& walls, std::vector<WallDoor>& d
 
     if ((door.far_jambs[0] - door.jambs[0]).norm() > kThinnest_m) continue;
     double nearest = kThickestWall_m;
+
     for (const WallLine& wall : walls) {
       const double distance = behind.dot(wall.at(0.5 * (wall.s0 + wall.s1)) - door.jambs[0]);
       if (wall.normal.dot(behind) < 0.99 || distance < kThinnest_m || distance > nearest) continue;
@@ -271,45 +273,62 @@ WallLine closing_of(const WallDoor& door) {
   return line;
 }
 
+namespace {
+
+/// True if the end of a wall's face is beside a door of that wall.
+bool is_at_door(const WallLine& wall, const Eigen::Vector2d& end, const std::vector<WallDoor>& doors) {
+  constexpr double kBeside_m = 0.3;
+  return std::any_of(doors.begin(), doors.end(), [&](const WallDoor& door) {
+    const Eigen::Vector2d along = (door.jambs[1] - door.jambs[0]).normalized();
+    const double s = along.dot(end - door.jambs[0]);
+    return s > -kBeside_m && s < door.width_m + kBeside_m && std::abs(wall.normal.dot(along)) < 0.1 &&
+           std::abs(wall.normal.dot(end - door.jambs[0])) < kThickestWall_m;
+  });
+}
+
+/// Distance to the next wall on the way, if that is nearer than `farthest` and its face looks this way; else
+/// nothing.
+std::optional<double> way_to_face(const Eigen::Vector2d& from, const Eigen::Vector2d& way,
+                                  const std::vector<WallLine>& walls, double farthest) {
+  constexpr double kNearest_m = 0.1, kLeastTurn = 0.5, kBeside_m = 0.15;
+  bool meets = false;
+  for (const WallLine& other : walls) {
+    const double turn = other.normal.dot(way);
+    if (std::abs(turn) < kLeastTurn) continue;
+    const double distance = (other.offset_m - other.normal.dot(from)) / turn;
+    const double s = other.along().dot(from + distance * way);
+    if (distance < -kNearest_m || distance > farthest || s < other.s0 - kBeside_m || s > other.s1 + kBeside_m)
+      continue;
+
+    farthest = distance;
+    meets = turn < 0.0;
+  }
+
+  if (!meets || farthest < kNearest_m) return std::nullopt;
+  return farthest;
+}
+
+}  // namespace
+
 std::vector<WallDoor> doors_at_free_ends(const std::vector<WallLine>& walls,
                                          const std::vector<WallDoor>& doors) {
-  constexpr double kNearest_m = 0.1;
   constexpr double kFarthest_m = 1.7;
   constexpr double kFarthestMet_m = 2.5;  // of a wall whose other end meets one
-  constexpr double kLeastTurn = 0.5;
-  constexpr double kBeside_m = 0.15;
-
   std::vector<WallDoor> found;
   for (const WallLine& wall : walls) {
     for (std::size_t end = 0; end < 2; ++end) {
       if (wall.corner[end] >= 0) continue;
       const Eigen::Vector2d from = wall.at(end == 0 ? wall.s0 : wall.s1);
       const Eigen::Vector2d way = end == 0 ? Eigen::Vector2d(-wall.along()) : wall.along();
-      const bool at_door = std::any_of(doors.begin(), doors.end(), [&](const WallDoor& door) {
-        const Eigen::Vector2d along = (door.jambs[1] - door.jambs[0]).normalized();
-        const double s = along.dot(from - door.jambs[0]);
-        return s > -0.3 && s < door.width_m + 0.3 && std::abs(wall.normal.dot(along)) < 0.1 &&
-               std::abs(wall.normal.dot(from - door.jambs[0])) < kThickestWall_m;
-      });
-      double nearest = wall.corner[1 - end] >= 0 ? kFarthestMet_m : kFarthest_m;
-      bool meets = false;
-      for (const WallLine& other : walls) {
-        const double turn = other.normal.dot(way);
-        if (std::abs(turn) < kLeastTurn) continue;
-        const double distance = (other.offset_m - other.normal.dot(from)) / turn;
-        const double s = other.along().dot(from + distance * way);
-        if (distance < -kNearest_m || distance > nearest || s < other.s0 - kBeside_m ||
-            s > other.s1 + kBeside_m)
-          continue;
-        nearest = distance;
-        meets = turn < 0.0;  // its face looks this way
-      }
-      if (at_door || !meets || nearest < kNearest_m) continue;
-      const Eigen::Vector2d to = from + nearest * way;
+      const auto distance =
+          way_to_face(from, way, walls, wall.corner[1 - end] >= 0 ? kFarthestMet_m : kFarthest_m);
+      if (!distance || is_at_door(wall, from, doors)) continue;
+
+      const Eigen::Vector2d to = from + *distance * way;
       WallDoor door;
       door.jambs = {end == 0 ? to : from, end == 0 ? from : to};
       door.far_jambs = door.jambs;
-      door.width_m = nearest;
+      door.width_m = *distance;
       found.push_back(door);
     }
   }

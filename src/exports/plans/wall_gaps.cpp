@@ -80,6 +80,7 @@ std::vector<WallOpening> gaps_between(const WallRaster& raster, double s0, doubl
   for (int c = begin; c <= end; ++c) {
     const bool over_sill = is_bare(raster, c, cut) && sill_of(raster, c, cut) > kLowestSill_m;
     if (!over_sill && !is_crossed(raster, c, cut)) continue;
+
     if (!runs.empty() && c - runs.back().second <= kBridge) {
       runs.back().second = c;
     } else {

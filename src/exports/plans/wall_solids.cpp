@@ -30,6 +30,7 @@ std::vector<SolidPart> thickness_along(const WallLine& wall, const std::vector<W
   constexpr double kThinnest_m = 0.02;
   std::vector<SolidPart> behind;
   std::vector<double> cuts{s0, s1};
+
   for (const WallLine& other : walls) {
     const double distance = wall.offset_m - wall.normal.dot(other.at(0.5 * (other.s0 + other.s1)));
     if (wall.normal.dot(other.normal) > -0.99 || distance < kThinnest_m || distance > kThickestWall_m)
@@ -37,6 +38,7 @@ std::vector<SolidPart> thickness_along(const WallLine& wall, const std::vector<W
     const SolidPart part{wall.along().dot(other.at(other.s1)), wall.along().dot(other.at(other.s0)),
                          distance};
     behind.push_back(part);
+
     for (const double s : {part.s0, part.s1}) {
       if (s > s0 && s < s1) cuts.push_back(s);
     }
@@ -44,6 +46,7 @@ std::vector<SolidPart> thickness_along(const WallLine& wall, const std::vector<W
 
   std::sort(cuts.begin(), cuts.end());
   std::vector<SolidPart> parts;
+
   for (std::size_t i = 0; i + 1 < cuts.size(); ++i) {
     const double middle = 0.5 * (cuts[i] + cuts[i + 1]);
     double thickness = 0.0;
@@ -53,6 +56,7 @@ std::vector<SolidPart> thickness_along(const WallLine& wall, const std::vector<W
     }
     parts.push_back({cuts[i], cuts[i + 1], thickness});
   }
+
   return parts;
 }
 
@@ -89,6 +93,7 @@ void add_solids(const SolidArea& area, bool assumed, const Eigen::Vector2d& orig
   constexpr double kStraight_m = 0.003, kSmallest_m2 = 0.002;
   SolidArea simple;
   bg::simplify(area, simple, kStraight_m / kSolidStep_m);
+
   for (const SolidPolygon& polygon : simple) {
     if (bg::area(polygon) * kSolidStep_m * kSolidStep_m < kSmallest_m2) continue;
     WallSolid solid;

@@ -92,6 +92,27 @@ std::vector<WallLine> close_free_ends(const cloud::Cloud& cloud, double floor_m,
   return closings;
 }
 
+/// The line of an opening, as far as the walls that it meets beside its jambs: what is left of its own wall
+/// there may be too short to be seen.
+WallLine to_next_walls(WallLine line, const std::vector<WallLine>& walls) {
+  constexpr double kFarthest_m = 0.4, kLeastTurn = 0.5, kBeside_m = 0.15;
+  for (const double sign : {-1.0, 1.0}) {
+    double& end = sign < 0.0 ? line.s0 : line.s1;
+    const Eigen::Vector2d from = line.at(end), way = sign * line.along();
+    double nearest = kFarthest_m;
+    for (const WallLine& wall : walls) {
+      const double turn = wall.normal.dot(way);
+      if (turn > -kLeastTurn) continue;
+      const double distance = (wall.offset_m - wall.normal.dot(from)) / turn;
+      const double s = wall.along().dot(from + distance * way);
+      if (distance > 0.0 && distance < nearest && s > wall.s0 - kBeside_m && s < wall.s1 + kBeside_m)
+        nearest = distance;
+    }
+    if (nearest < kFarthest_m) end += sign * nearest;
+  }
+  return line;
+}
+
 /// Thickness of walls of which both faces were seen.
 void set_thickness(std::vector<WallLine>& walls) {
   constexpr double kLeastCommon_m = 0.3;
@@ -210,12 +231,15 @@ core::Result<WallPlan> find_walls(MapSource& source) {
   find_far_sides(plan.walls, plan.doors);
   measure_doors(points, floor_m, plan.doors);
 
-  constexpr double kThinnestOpening_m = 0.03;  // thinner ones are no cell between rooms
   if (plan.rays_known) {
     std::vector<WallLine> closings = close_free_ends(points, floor_m, plan);
     for (const WallDoor& door : plan.doors) {
-      if (door.depth_m() < kThinnestOpening_m) closings.push_back(closing_of(door));
+      WallDoor behind = door;
+      behind.jambs = door.far_jambs;
+      for (const WallDoor& side : {door, behind})
+        closings.push_back(to_next_walls(closing_of(side), plan.walls));
     }
+
     plan.rooms = rooms_in(box_of(plan.walls), plan.walls, closings, plan.doors, space);
   } else {
     plan.rooms = rooms_of(plan.walls);

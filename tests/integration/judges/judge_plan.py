@@ -144,13 +144,16 @@ def main():
     space = ezdxf.readfile(plan).modelspace()
     ends = lambda layer: [np.array([list(e.dxf.start)[:2], list(e.dxf.end)[:2]])
                           for e in space.query(f'LINE[layer=="{layer}"]')]
-    pieces, drawn_doors = ends("walls"), ends("doors")
+    edges = ends("A-DOOR")  # of both sides of the wall, one after the other
+    pieces, drawn_doors = ends("A-WALL"), [0.5 * (a + b) for a, b in zip(edges[0::2], edges[1::2])]
+    windows = [np.array([w.ocs().to_wcs(w.dxf.insert), w.matrix44().transform((1, 1, 0))])[:, :2]
+               for w in space.query('INSERT[layer=="A-GLAZ"]')]
     jambs = [end for door in drawn_doors for end in door]
     long = [p for p in pieces if np.linalg.norm(p[1] - p[0]) > 0.3]
     sides, doors = truth_of(scene)
     yaw, shift = fitted(long, sides, yaw, shift)
 
-    lines = whole_lines(long, [door.mean(axis=0) for door in [*drawn_doors, *ends("windows")]])
+    lines = whole_lines(long, [door.mean(axis=0) for door in [*drawn_doors, *ends("A-GLAZ"), *windows]])
     corners = corners_of(sides)
     offs, lengths, strange, table = [], [], [], []
     for line in lines:

@@ -332,13 +332,13 @@ def case_grid(case):
 
 
 def dxf_walls(file):
-    """Ends of the lines of the layer walls, from the pairs of group code and value."""
+    """Ends of the lines of the layer A-WALL, from the pairs of group code and value."""
     lines = file.read_text().splitlines()
     pairs = [(int(code), value) for code, value in zip(lines[::2], lines[1::2])]
     walls, entity = [], None
     for code, value in pairs:
         if code == 0:
-            if entity and entity.get("type") == "LINE" and entity.get(8) == "walls":
+            if entity and entity.get("type") == "LINE" and entity.get(8) == "A-WALL":
                 walls.append(((float(entity[10]), float(entity[20])), (float(entity[11]), float(entity[21]))))
             entity = {"type": value}
         elif entity is not None:

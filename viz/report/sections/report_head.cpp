@@ -157,7 +157,7 @@ core::Result<std::string> logo_html(const std::filesystem::path& file) {
                                                                        : "";
   if (kind.empty())
     return core::input_error(
-        fmt::format("{}: is no picture for a logo; give a PNG, JPEG or SVG file", file.string()));
+        fmt::format("{}: is not a PNG, JPEG or SVG picture, which a logo must be", file.string()));
   return fmt::format("<img class=\"logo\" alt=\"\" src=\"data:image/{};base64,{}\"/>\n", kind, base64(bytes));
 }
 

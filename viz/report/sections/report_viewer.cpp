@@ -50,6 +50,7 @@ core::Result<std::string> viewer_html(ReportData& data, const ReportRequest& req
   data.plan_html = plan_html(view->plan);
   view->scene.name = data.name;
   view->scene.clouds.front().name = data.name;
+
   const std::string placing =
       view->scene.placing.empty() ? std::string() : paragraph(view->scene.placing + ".");
   return placing +
