@@ -66,7 +66,7 @@ RunContext context_of(const FuseRequest& request, const maps::StoredMaps& maps, 
   context.input.text = names_of(maps);
   context.store.configuration = config_text(request, maps, graph);
   context.input.into = !request.into.empty();
-  // What a visit says about clouds is known when all of them were read.
+  // Clouds are changed by a visit when all of them were read.
   context.store.keeps_clouds = keeps_clouds(graph) && request.into.empty();
   context.hooks.observer = request.observer.get();
   context.hooks.finishing = request.finishing;

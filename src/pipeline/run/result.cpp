@@ -24,6 +24,7 @@ core::Result<Graph> load_pipeline(const RunRequest& request) {
   std::vector<std::string> of_file, of_visit;
   for (const std::string& text : request.overrides)
     (text.rfind(std::string(kVisitStage) + ".", 0) == 0 ? of_visit : of_file).push_back(text);
+
   const auto whole = load_graph(*file, registry, request.pipelines_folder, of_file);
   if (!whole) return tl::unexpected(whole.error());
   const bool joins = request.part == PipelinePart::kJoining;

@@ -52,12 +52,15 @@ class VisitStage : public Stage {
       if (auto done = revise(*result, *revised); !done) return done;
     }
     result->revised = std::move(revised);
+    result_ = result;
     io.output<MapResult>("map", result);
     return {};
   }
 
   void report(Json& summary) const override {
     if (!context_->input.into) return;
+    summary["keyframes"] = result_->map->keyframe_count();
+    summary["landmarks"] = {{"points", result_->map->point_count()}, {"lines", result_->lines.size()}};
     summary["visit"] = {{"joined", keyframes_ > 0},
                         {"held", held_},
                         {"keyframes", keyframes_},
@@ -133,9 +136,11 @@ class VisitStage : public Stage {
     remove_gone(*changes, visitors_, map);
     gone_landmarks_ =
         result.map->point_count() + result.map->line_count() - map.point_count() - map.line_count();
+
     refer_to_others(map, redundant, result.frame_poses);
     result.map = std::make_shared<maps::Map>(maps::without(map, redundant));
     take_poses_from_map(result);
+
     auto& accuracy = result.accuracy.keyframes;
     accuracy.erase(std::remove_if(accuracy.begin(), accuracy.end(),
                                   [&](const auto& of) { return redundant.count(of.keyframe) != 0; }),
@@ -166,6 +171,7 @@ class VisitStage : public Stage {
   }
 
   const RunContext* context_ = nullptr;
+  std::shared_ptr<const MapResult> result_;
   ThinningOptions options_;
   std::set<std::int32_t> visitors_;  ///< robots of the visit
   std::size_t keyframes_ = 0;        ///< of the visit, in the map

@@ -75,7 +75,8 @@ std::set<KeyframeId> redundant_keyframes(const maps::Map& map, const std::set<st
   for (const KeyframeId id : map.keyframe_ids()) {
     if (visitors.count(id.robot) == 0) continue;
     const auto view = views.find(id);
-    bool keep = begun.insert(id.robot).second || view == views.end();
+    bool keep = begun.insert(id.robot).second || view == views.end() || !map.parent(id).valid();
+
     if (!keep) {
       const auto& shows = changes.shows[view->second];
       const auto adds = std::count_if(shows.begin(), shows.end(),

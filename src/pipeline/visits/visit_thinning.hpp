@@ -15,7 +15,7 @@ namespace plumbline::pipeline {
 struct ThinningOptions {
   bool thin = true;         ///< leave keyframes out at all
   double share_new = 0.25;  ///< keyframes with a larger share of new surface are kept
-  int views = 8;            ///< else new surface is kept in so many keyframes
+  int views = 5;            ///< else new surface is kept in so many keyframes
   int cells = 30;           ///< of which each adds at least so many cells
   double apart_m = 1.0;     ///< keyframes are kept that have none nearer than this
   double apart_rad = 0.7;   ///< or turned by less
@@ -23,7 +23,7 @@ struct ThinningOptions {
 };
 
 /// The keyframes of `visitors` (robots) whose view the map holds without them. Of each robot the first one is
-/// kept, and a keyframe without a view. `views`: indices into `changes` by keyframe.
+/// kept, a keyframe without a view, and roots. `views`: indices into `changes` by keyframe.
 std::set<core::KeyframeId> redundant_keyframes(const maps::Map& map, const std::set<std::int32_t>& visitors,
                                                const std::map<core::KeyframeId, std::size_t>& views,
                                                const VisitChanges& changes, const ThinningOptions& options);

@@ -34,6 +34,7 @@ bool hold_earlier(const maps::Map& earlier, const std::set<std::int32_t>& visito
     const Rigid3 earlier_from_world = earlier.camera_from_world(id).inverse() * map.camera_from_world(id);
     const Eigen::Vector3d before = earlier.camera_from_world(id).inverse().translation;
     if ((before - map.camera_from_world(id).inverse().translation).norm() >= kNewLoop_m) return false;
+
     corrections[id] = earlier_from_world;
     poses.emplace_back(id, earlier.camera_from_world(id));
   }
