@@ -12,7 +12,7 @@ else()
                          COMMAND ${CMAKE_COMMAND} -E false)
 endif()
 
-# cmake --build DIR --target docs: the reference of the public headers, in DIR/docs/html. A warning is an error.
+# cmake --build DIR --target docs: the reference of the installed headers, in DIR/docs/html. A warning is an error.
 find_package(Doxygen QUIET)
 if(NOT DOXYGEN_FOUND)
   add_custom_target(docs COMMAND ${CMAKE_COMMAND} -E echo "Doxygen is missing; scripts/install-deps installs it"
@@ -30,5 +30,6 @@ set(DOXYGEN_AUTOLINK_SUPPORT NO) # words such as "Map" are not meant as links
 set(DOXYGEN_HAVE_DOT NO)
 set(DOXYGEN_QUIET YES)
 set(DOXYGEN_WARN_AS_ERROR FAIL_ON_WARNINGS)
-doxygen_add_docs(docs ${PROJECT_SOURCE_DIR}/include/plumbline ${PROJECT_SOURCE_DIR}/cmake/library.md
+list(TRANSFORM public_headers PREPEND ${PROJECT_SOURCE_DIR}/include/plumbline/ OUTPUT_VARIABLE documented)
+doxygen_add_docs(docs ${documented} ${PROJECT_SOURCE_DIR}/cmake/library.md
                  COMMENT "Reference of the public headers")

@@ -10,7 +10,7 @@
 //                   [] { return std::make_unique<MyFilter>(); }});
 //   }
 //
-// Built against the installed library (find_package(plumbline), target plumbline::cloud) as a MODULE; an
+// Built against the installed library (find_package(plumbline), target plumbline::plumbline) as a MODULE; an
 // example project is in examples/plugin_filter. The program hands its registry to the plugin: there is only
 // one.
 #include <pcl/pcl_config.h>
