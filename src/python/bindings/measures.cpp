@@ -131,7 +131,7 @@ void compare(const fs::path& before, const fs::path& after, const fs::path& outp
   request.order = given_order ? changes::Order::kGiven : changes::Order::kStamps;
   set_options(request.options, values, "compare");
   const py::gil_scoped_release free;
-  QueueLog log;
+  Watch log;
   value_of(changes::compare_maps(request, core::Executor(threads), log, nullptr));
 }
 
