@@ -83,8 +83,9 @@ core::Result<Mapper> Mapper::start(const sensor::Camera& camera, const std::file
     if (const std::string problem = sensor::camera_problem(camera); !problem.empty())
       return core::usage_error("camera: " + problem);
     if (options.queue < 1) return core::usage_error("queue: 0 is out of range (allowed: at least 1)");
-    return session::place_of(output).map(
-        [&](const session::Place& place) { return Mapper(std::make_unique<Impl>(camera, place, options)); });
+    auto place = session::place_of(output);
+    if (!place) return tl::unexpected(place.error());
+    return Mapper(std::make_unique<Impl>(camera, std::move(*place), options));
   });
 }
 
