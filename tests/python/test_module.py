@@ -335,7 +335,8 @@ class Results(Folder):
         self.assertTrue(1e-5 < length.within < 0.3, length)
         self.assertGreater(self.result.length(ends).metres, 0.0)
 
-        # Both points move with one camera; a result without samples says so.
+        # The points' own noise counts; both points move with one camera; a result without samples says so.
+        self.assertAlmostEqual(self.result.length(ends, seen=[0, 0], sigma=0.1).within, 2.04 * 0.1 * 2**0.5, places=4)
         self.assertLess(self.result.length(ends, seen=[0, 0]).within, 0.1 * length.within)
         (self.work / "bare").mkdir()
         for name in ("summary.json", "config.yaml", "trajectory.txt"):

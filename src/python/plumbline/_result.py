@@ -44,7 +44,7 @@ class Keyframes(NamedTuple):
 
 
 class Length(NamedTuple):
-    """A length in metres; the true one lies within +- `within` of it with a probability of 95 %, but for the scale."""
+    """A length in metres; the true one, but for the scale, lies within +- `within` of it with a probability of 95 %."""
 
     metres: float
     within: float
@@ -228,10 +228,11 @@ class Result:
             raise _core.InputError(f"{file}: cannot be read: {problem}; results whose path was checked have it") from problem
         return records["motion"]
 
-    def length(self, points: npt.ArrayLike, seen: Optional[npt.ArrayLike] = None) -> Length:
-        """Length of the line through P x 3 points of the map, with its 95 %: what the poses' errors can change.
+    def length(self, points: npt.ArrayLike, seen: Optional[npt.ArrayLike] = None, sigma: npt.ArrayLike = 0.0) -> Length:
+        """Length of the line through P x 3 points of the map, with its 95 %: what errors of the poses and of the points can change.
 
         seen: rows of `keyframes` by which each point was measured; None: of those that have it in view the nearest.
+        sigma: standard deviation of each point's own place, metres, such as the cloud's column "sigma".
         """
         p = np.asarray(points, np.float64).reshape(-1, 3)
         rows = np.array([self._nearest_view(q) for q in p], np.int64) if seen is None else np.asarray(seen, np.int64)
@@ -243,7 +244,8 @@ class Result:
 
         metres = float(np.linalg.norm(np.diff(p, axis=0), axis=-1).sum())
         drawn = np.linalg.norm(np.diff(moved, axis=0), axis=-1).sum(axis=0)
-        return Length(metres, float(2.04 * np.sqrt(np.mean((drawn - metres) ** 2))))  # Student's, of 32 draws
+        own = np.sum(np.broadcast_to(np.asarray(sigma, np.float64), len(p)) ** 2)
+        return Length(metres, float(2.04 * np.sqrt(np.mean((drawn - metres) ** 2) + own)))  # Student's, of 32 draws
 
     def _nearest_view(self, point: npt.NDArray[np.float64]) -> int:
         """Row of the keyframe nearest to a point among those that have it in view, else of the nearest one."""
