@@ -209,7 +209,7 @@ void put_area(DxfText& dxf, const DrawnArea& area, const std::string& layer) {
   dxf.put(75, 0);
   dxf.put(76, 1);
   dxf.put(52, 0.0);
-  dxf.put(41, area.spacing_m / 0.125);  // of the pattern's own lines
+  dxf.put(41, area.spacing_m / 3.175);  // of the lines of the metric pattern
   dxf.put(77, 0);
   dxf.put(78, 1);
 

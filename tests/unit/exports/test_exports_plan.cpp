@@ -233,7 +233,7 @@ TEST_F(ExportPlan, LayersAreLeftOutInAllFiles) {
 }
 
 /// Area of an outline less that of its holes.
-double area_of(const WallSolid& solid) {
+double solid_area(const WallSolid& solid) {
   double area = 0.0;
   for (const auto& ring : solid.rings) area += area_of(ring);
   return area;
@@ -254,15 +254,17 @@ TEST(PlanSolids, FillBetweenFacesAndAssumeTheRest) {
   const std::vector<WallSolid> solids = wall_solids(plan, 1.0);
   ASSERT_EQ(solids.size(), 2U);
   EXPECT_FALSE(solids[0].assumed);
-  EXPECT_NEAR(area_of(solids[0]), 3.0 * 0.2, 1e-3);
+  EXPECT_NEAR(solid_area(solids[0]), 3.0 * 0.2, 1e-3);
   EXPECT_TRUE(solids[1].assumed);
-  EXPECT_NEAR(area_of(solids[1]), 1.0 * 0.1, 1e-3);
+  EXPECT_NEAR(solid_area(solids[1]), 1.0 * 0.1, 1e-3);
 }
 
 TEST(PlanOpenings, AreTurnedWithThePlan) {
   WallPlan plan;
   plan.walls.resize(1);
-  plan.walls[0] = {Eigen::Vector2d::UnitX(), 2.0, -1.0, 3.0};
+  plan.walls[0].offset_m = 2.0;
+  plan.walls[0].s0 = -1.0;
+  plan.walls[0].s1 = 3.0;
   plan.walls[0].openings = {{0.0, 1.0}};
   plan.rooms.resize(1);
   plan.rooms[0].label = {1.0, 2.0};
