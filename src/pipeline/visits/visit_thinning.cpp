@@ -114,6 +114,7 @@ void refer_to_others(const maps::Map& map, const std::set<KeyframeId>& gone,
     frame.camera_from_reference = frame.camera_from_reference * map.camera_from_world(frame.reference) *
                                   map.camera_from_world(nearest).inverse();
     frame.reference = nearest;
+    frame.seen = nullptr;
   }
 }
 

@@ -8,7 +8,7 @@
 #include "plumbline/core/options.hpp"
 #include "plumbline/maps/frame_pose.hpp"
 #include "plumbline/maps/map.hpp"
-#include "visits/visit_changes.hpp"
+#include "visit_changes.hpp"
 
 namespace plumbline::pipeline {
 
@@ -28,7 +28,8 @@ std::set<core::KeyframeId> redundant_keyframes(const maps::Map& map, const std::
                                                const std::map<core::KeyframeId, std::size_t>& views,
                                                const VisitChanges& changes, const ThinningOptions& options);
 
-/// Makes frames relative to the nearest keyframe in time of the same robot, where theirs is among `gone`.
+/// Makes frames relative to the nearest keyframe in time of the same robot, where theirs is among `gone`;
+/// these no longer tell which points they saw.
 void refer_to_others(const maps::Map& map, const std::set<core::KeyframeId>& gone,
                      std::vector<maps::FramePose>& frames);
 
