@@ -59,6 +59,7 @@ int run_command(Session& session) {
   } catch (const std::system_error& e) {
     if (std::ferror(stdout) != 0)  // thrown by fmt::print
       return check_standard_output(session, static_cast<int>(core::ErrorKind::kOutput), e.code().value());
+
     if (const core::Error error = core::error_of(e); error.kind == core::ErrorKind::kOutput)
       return session.fail(error);
     what = e.what();
@@ -245,6 +246,7 @@ int run(int argc, char** argv) {
         add_evaluate, add_check,    add_synth,  add_filter, add_pipelines, add_play, add_completion}) {
     add(app, session);
   }
+
   refuse_empty_values(app);
 
   try {
@@ -257,6 +259,7 @@ int run(int argc, char** argv) {
       app.exit(e);
       return check_standard_output(session, 0, errno);
     }
+
     return session.fail({core::ErrorKind::kUsage, usage_problem(app, e)});
   }
 

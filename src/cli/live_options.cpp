@@ -56,6 +56,7 @@ core::Result<void> prepare_publisher(Session& session, const PublishRequest& pub
     return core::usage_error("--frames names what --publish ros2://DOMAIN sends; give that too");
   }
   auto frames = net::parse_published_frames(publish.frames);
+
   if (!frames) return tl::unexpected<core::Error>(frames.error());
   if (frames->given() && publish.robots > 1) {
     return core::usage_error(
@@ -68,6 +69,7 @@ core::Result<void> prepare_publisher(Session& session, const PublishRequest& pub
   auto publisher = net::open_ros2_publisher(publish.address, names, name, *frames, session.console());
   if (!publisher) return tl::unexpected<core::Error>(publisher.error());
   request.observer = std::move(*publisher);
+
   return {};
 }
 

@@ -38,6 +38,7 @@ std::string value_name(const core::OptionSpec& spec) {
     case core::OptionType::kTextOrList:
       return "FILE|[...]";
   }
+
   return "VALUE";
 }
 

@@ -130,19 +130,23 @@ core::Result<std::vector<evaluate::NamedReport>> measure_paths(const TrajectoryR
   const fs::path in_folder = file_in(given, "groundtruth.txt");
   std::error_code ignored;
   const bool by_layout = fs::is_directory(given, ignored) && !fs::exists(in_folder, ignored);
+
   const fs::path& truth_file = by_layout ? given : in_folder;
   const auto truth =
       by_layout ? dataset::recording_poses(given, console) : dataset::read_trajectory_file(truth_file);
+
   if (!truth) return tl::unexpected<core::Error>(truth.error());
 
   for (const std::string& note : truth->notes)
     console.warning(fmt::format("{}: {}", truth_file.string(), note));
   const std::vector<std::string> others = evaluate::other_truths(truth_file);
+
   if (!others.empty()) {
     console.info(fmt::format("the truth is {}; beside it there are {}: name a file to take another",
                              truth_file.string(), fmt::join(others, ", ")));
   }
   std::vector<double> stamps;
+
   if (!request.frames.empty()) {
     auto read = evaluate::read_frame_stamps(request.frames);
     if (!read) return tl::unexpected<core::Error>(read.error());
@@ -154,6 +158,7 @@ core::Result<std::vector<evaluate::NamedReport>> measure_paths(const TrajectoryR
   for (std::size_t i = 0; i < estimates.size(); ++i) {
     const fs::path file = file_in(estimates[i], "trajectory.txt");
     auto estimate = read_estimate(estimates[i]);
+
     if (!estimate) return tl::unexpected<core::Error>(estimate.error());
 
     dataset::TrajectoryReading fitting_truth = *truth;
@@ -166,6 +171,7 @@ core::Result<std::vector<evaluate::NamedReport>> measure_paths(const TrajectoryR
         evaluate::evaluate_trajectory(estimate->poses, fitting_truth.poses, request.options, stamps);
     if (!report) return about(file, truth_file, report.error());
     evaluate::TrajectoryOptions of_components = request.options;
+
     if (report->body && report->body->removed)  // too short to fit it to
       of_components.body = evaluate::body_text(report->body->body_from_camera);
     report->components = measure_components(estimates[i], fitting_truth.poses, of_components);

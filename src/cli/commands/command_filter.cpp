@@ -105,6 +105,7 @@ core::Result<cloud::CloudPtr> read_inputs(const FilterRequest& request, cloud::C
       *all += *file->cloud;
     }
   }
+
   return all;
 }
 

@@ -30,6 +30,7 @@ int hub(Session& session, net::HubRequest request, double quota_gb, const std::s
   if (!finished) return session.fail(finished.error());
   if (*finished) {
     session.console().info(request.fuse.output.string() + ": is finished; there is nothing to continue");
+
     return 0;
   }
   if (auto prepared =
@@ -54,6 +55,7 @@ int hub(Session& session, net::HubRequest request, double quota_gb, const std::s
         if (*live) (*live)->tell(line);
       },
       console.counting("clouds"));
+
   return session.finish(summary, request.fuse.output);
 }
 
@@ -69,6 +71,7 @@ void add_hub(CLI::App& app, Session& session) {
                   [&session, request, quota_gb, publish, page] {
                     return hub(session, *request, *quota_gb, *publish, *page);
                   });
+
   command->footer(kTwoTerminals);
 
   command->add_option("-o,--output", request->fuse.output, "Folder for the result")
@@ -77,6 +80,7 @@ void add_hub(CLI::App& app, Session& session) {
   command->add_option("--robots", request->robots, "Fuse when this many robots are done (default: at Ctrl-C)")
       ->type_name("N")
       ->check(CLI::Range(1, 64));
+
   add_network_options(*command, request->network);
   add_publish_option(*command, *publish);
   add_live_options(*command, *page);
@@ -86,11 +90,13 @@ void add_hub(CLI::App& app, Session& session) {
       ->check(CLI::PositiveNumber);
   command->add_option("--anchor", request->fuse.anchor, "Robot whose map defines the frame of the result")
       ->type_name("NAME");
+
   command
       ->add_option(
           "--into", request->fuse.into,
           "Finished map (result folder or map.db) that all robots visit, as for map; it stays as it is")
       ->type_name("MAP");
+
   command->add_flag("--resume", request->resume, "Continue an interrupted hub from OUT.partial");
   add_pipeline_options(*command, session, request->fuse);
 }

@@ -233,11 +233,13 @@ void add_info(CLI::App& app, Session& session) {
       ->type_name("NAME|FILE");
   add_topic_option(*command, request->open);
   auto formats = dataset::layout_names();
+
   formats.emplace_back("json");
   command
       ->add_option("--format", request->open.format,
                    "Layout of the recording (default: auto); json: as --json")
       ->check(CLI::IsMember(formats));
+
   command->add_flag("--json", request->json, "Print all that a result's summary.json says, as JSON");
 }
 

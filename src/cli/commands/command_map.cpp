@@ -145,12 +145,14 @@ void add_map(CLI::App& app, Session& session) {
           "Convention of the poses that come with a recording: inverted (camera from world), opengl (y up, z "
           "backwards), wxyz (quaternions begin with w)")
       ->check(CLI::IsMember({"inverted", "opengl", "wxyz"}));
+
   command
       ->add_option(
           "--into", request->into,
           "Another visit of this map (result folder or map.db), which stays as it is: OUT holds both, in "
           "its frame, without what is gone")
       ->type_name("MAP");
+
   add_frames_options(*command, *publish);
   add_map_options(*command, session, *request);
   add_live_options(*command, *page);

@@ -45,11 +45,13 @@ void add_report(CLI::App& app, Session& session) {
           "--points", request->points,
           "Largest number of points of the map to walk through, thinned by voxels; 0: all (default: 1500000)")
       ->type_name("N");
+
   command->add_option("--title", request->title, "Title (default: the folder's name)")->type_name("TEXT");
   command->add_option("--client", request->client, "Client, for the first page")->type_name("TEXT");
   command->add_option("--address", request->address, "Address, for the first page")->type_name("TEXT");
   command->add_option("--date", request->date, "Date of the recording, for the first page")
       ->type_name("TEXT");
+
   command->add_option("--logo", request->logo, "Logo for the first page: PNG, JPEG or SVG")
       ->type_name("FILE");
   command->add_flag("--force", request->replace, "Replace an earlier report");

@@ -30,6 +30,7 @@ core::Result<void> film(SynthRequest& request, Session& session) {
   const auto pipelines = session.pipelines_folder();
   if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
   const auto scene = synth::open_scene(request.scene, request.options, *pipelines / "scenes");
+
   if (!scene) return tl::unexpected<core::Error>(scene.error());
 
   std::error_code ec;
@@ -42,6 +43,7 @@ core::Result<void> film(SynthRequest& request, Session& session) {
   const auto summary = synth::write_recordings(*scene, request.options, request.output, session.executor(),
                                                stop_on_signals(), console, console.counting("frames"));
   console.end_progress();
+
   if (!summary) return tl::unexpected<core::Error>(summary.error());
 
   if (!session.quiet) {
@@ -51,6 +53,7 @@ core::Result<void> film(SynthRequest& request, Session& session) {
                 static_cast<double>(std::max<std::size_t>(1, summary->reference_samples)),
             summary->openings_seen, summary->openings);
     }
+
     print("{}{} robots, {} frames, {:.1f} m of path, {} reference points in {}\n",
           summary->stopped ? "stopped early: " : "", summary->robots, summary->frames, summary->path_m,
           summary->reference_samples, request.output.string());

@@ -230,6 +230,7 @@ std::vector<std::string> shell_words(const std::string& line) {
       words.back() += c;
     }
   }
+
   return words;
 }
 

@@ -38,6 +38,7 @@ Json filter_definitions(const FilterRegistry& registry) {
   for (const FilterInfo& info : registry.filters()) {
     const std::string name = "filter." + info.type;
     definitions[name] = filter_schema(info);
+
     // if/then instead of oneOf: an editor then reports what is wrong with this filter, not with all of them.
     Json rule;
     rule["if"] = {{"properties", {{"type", {{"const", info.type}}}}}, {"required", Json::array({"type"})}};

@@ -31,9 +31,11 @@ core::Result<void> PlyTiles::take_layout(const std::filesystem::path& file, cons
   const auto refused = [&file](const std::string& why) {
     return core::input_error(file.string() + ": " + why);
   };
+
   if (header.format == PlyFormat::kAscii)
     return refused(
         "is a text file; tiles need binary PLY: write it as one with a chain without filters first");
+
   if (header.elements.empty() || header.elements.front().name != "vertex")
     return refused("does not begin with points");
   for (std::size_t i = 1; i < header.elements.size(); ++i) {
@@ -44,6 +46,7 @@ core::Result<void> PlyTiles::take_layout(const std::filesystem::path& file, cons
   const auto same = [](const PlyProperty& a, const PlyProperty& b) {
     return a.name == b.name && a.type == b.type;
   };
+
   if (record_size_ > 0) {
     const bool fits = header.format == format_ && std::equal(properties.begin(), properties.end(),
                                                              properties_.begin(), properties_.end(), same);
@@ -58,6 +61,7 @@ core::Result<void> PlyTiles::take_layout(const std::filesystem::path& file, cons
       return refused(fmt::format("has lists ('{}') at its points; tiles need plain numbers", property.name));
     const std::size_t axis =
         property.name.size() == 1 ? std::string("xyz").find(property.name) : std::string::npos;
+
     if (axis != std::string::npos) {
       offset_[axis] = record_size_;
       position_type_[axis] = property.type;
@@ -75,6 +79,7 @@ core::Result<void> PlyTiles::add(const std::filesystem::path& file) {
   ByteReader reader(file);
   if (!reader.open()) return core::input_error(file.string() + ": does not exist, or cannot be read");
   const auto header = read_ply_header(reader);
+
   if (!header) return core::input_error(file.string() + ": " + header.error().message);
   if (auto fits = take_layout(file, *header); !fits) return fits;
 
@@ -91,14 +96,17 @@ core::Result<void> PlyTiles::add(const std::filesystem::path& file) {
     if (record == nullptr) return core::input_error(file.string() + ": cannot be read to its end");
     if (first && i % sampled == 0) sample(record);
     put(record);
+
     if (tiles_.size() > kMostTiles) {
       return core::usage_error(
           fmt::format("{}: more than {} tiles of {:g} m; use larger ones, or remove far points first",
                       file.string(), kMostTiles, tile_m_));
     }
+
     if (waiting_ < kMostWaiting) continue;
     if (auto written = write_waiting(); !written) return written;
   }
+
   return {};
 }
 
@@ -121,6 +129,7 @@ void PlyTiles::put(const std::uint8_t* record) {
   // The tile of the point, and those to whose margin it belongs.
   const TileKey first = tile_of(position - Eigen::Vector3d::Constant(margin_m_), tile_m_);
   const TileKey last = tile_of(position + Eigen::Vector3d::Constant(margin_m_), tile_m_);
+
   for (std::int64_t x = first[0]; x <= last[0]; ++x) {
     for (std::int64_t y = first[1]; y <= last[1]; ++y) {
       for (std::int64_t z = first[2]; z <= last[2]; ++z) {

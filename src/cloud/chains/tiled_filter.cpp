@@ -77,6 +77,7 @@ core::Result<void> join(const std::vector<fs::path>& pieces, std::size_t points,
     const std::string header = header_text(reader);
     const std::size_t count = header.find("element vertex ");
     const std::size_t behind = header.find('\n', count);
+
     if (properties.empty()) {
       properties = header.substr(behind);
       out.write(header.substr(0, count) + fmt::format("element vertex {}", points) + properties);
@@ -92,6 +93,7 @@ core::Result<void> join(const std::vector<fs::path>& pieces, std::size_t points,
       out.write(bytes, size);
     }
   }
+
   return out.commit();
 }
 

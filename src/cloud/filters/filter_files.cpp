@@ -28,11 +28,13 @@ class MergeFilter : public Filter {
     const auto other = read_cloud(file_, LargeCoordinates::kShifted);
     if (!other) return tl::unexpected<core::Error>(other.error());
     const auto fits = check_one_frame("the chain's cloud", context.shift, file_, other->shift);
+
     if (!fits) return tl::unexpected<core::Error>(fits.error());
     if (context.frame != nullptr) {
       const auto same = check_same_up("the chain's cloud", *context.frame, file_, other->frame);
       if (!same) return tl::unexpected<core::Error>(same.error());
     }
+
     change_shift(*other->cloud, other->shift, context.shift);
     auto output = like(*input);
     output->points.reserve(input->size() + other->cloud->size());

@@ -96,6 +96,7 @@ class Fusion {
         return;
       }
       world_from_cloud_[v] = views_.world_from_camera[v] * sensor_pose(**cloud);
+
       is_depth_view_[v] = is_depth_view(**cloud, views_.cameras[v]) ? 1 : 0;
       if (is_depth_view_[v] == 0) cells[v] = color_cells(**cloud, world_from_cloud_[v], kCell_m);
       if (options_.free_space) rasters_[v] = depth_raster(**cloud, views_.cameras[v]);
@@ -105,6 +106,7 @@ class Fusion {
     if (!views_.covariances.empty()) find_pose_noise(cells);
     tiles_ = plan_tiles(cells, cells_per_tile(options_));
     report.tiles = tiles_.size();
+
     if (!options_.exposure) return {};
 
     gains_ = color_gains(cells);
@@ -271,11 +273,13 @@ class Fusion {
     if (views_.covariances.empty()) return;
     std::vector<float>& sigmas = all.columns.others.front().values;
     constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
+
     // Noise of the point's cell; a point outside all known cells takes that of the point before.
     const PoseNoise* pose = nullptr;
     for (const FusedPoint& fused : points) {
       const Eigen::Vector3d at = fused.point.getVector3fMap().cast<double>() / kCell_m;
       const auto found = pose_noise_.find(pack_cell(cell_of(at)));
+
       if (found != pose_noise_.end()) pose = &found->second;
       float variance = fused.noise_m * fused.noise_m / static_cast<float>(std::max(1U, fused.observations));
       if (pose != nullptr) {
@@ -283,6 +287,7 @@ class Fusion {
         const float sum = normal.allFinite() ? normal.dot(pose->sum * normal) : pose->sum.trace() / 3.0F;
         variance += pose->weight > 0.0F ? std::max(0.0F, sum / pose->weight) : kUnknown;
       }
+
       sigmas.push_back(std::sqrt(variance));
     }
   }

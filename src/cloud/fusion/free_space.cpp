@@ -143,6 +143,7 @@ DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camer
   raster.camera = camera;
   raster.width = (camera.width + kCell - 1) / kCell;
   raster.height = (camera.height + kCell - 1) / kCell;
+
   raster.nearest.assign(static_cast<std::size_t>(raster.width) * static_cast<std::size_t>(raster.height), 0);
 
   for (const Point& p : camera_cloud.points) {
@@ -152,6 +153,7 @@ DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camer
     const int column = static_cast<int>(pixel.x() + 0.5) / kCell;
     const int row = static_cast<int>(pixel.y() + 0.5) / kCell;
     std::uint16_t& cell = raster.nearest[static_cast<std::size_t>(row * raster.width + column)];
+
     const auto mm = static_cast<std::uint16_t>(std::max(1.0F, 1000.0F * p.z + 0.5F));
     if (cell == 0 || mm < cell) cell = mm;
     raster.furthest_m = std::max(raster.furthest_m, p.z);

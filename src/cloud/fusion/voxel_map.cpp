@@ -137,6 +137,7 @@ std::vector<FusedPoint> VoxelMap::merged(const std::vector<FusedPoint>& points,
     side.observations = fused.observations;
     side.robot = fused.robot & 0xFFU;
     side.robot_lead = fused.robot_lead & 0x7FFFFFU;
+
     order.emplace_back(pack_cell(sample.voxel) << 1U, samples.size());
     samples.push_back(side);
   }
@@ -152,6 +153,7 @@ std::vector<FusedPoint> VoxelMap::merged(const std::vector<FusedPoint>& points,
       const VoxelSide& sample = samples[order[i].second];
       combine(sample, kOneView, sides[opposed(sample, sides[0]) ? 1 : 0]);
     }
+
     for (std::uint64_t k = 0; k < 2; ++k) {
       if (sides[k].weight > 0.0F) result.push_back(point_of(key | k, sides[k], options.voxel_m));
     }

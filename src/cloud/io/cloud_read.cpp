@@ -50,6 +50,7 @@ core::Result<CloudFile> read_ply_cloud(const std::filesystem::path& file, LargeC
   CloudFile result = builder.finish();
   result.shift = Eigen::Map<const Eigen::Vector3d>(ply->shift.data());
   result.frame = frame_in(ply->comments);
+
   return result;
 }
 

@@ -81,6 +81,7 @@ Meaning meaning_of(const std::string& name) {
                         lower != "a" && std::all_of(lower.begin(), lower.end(), [](unsigned char c) {
                           return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.';
                         });
+
   return writable ? Meaning::kOther : Meaning::kNone;
 }
 

@@ -329,6 +329,7 @@ core::Result<void> write_ply(const std::filesystem::path& file, const PlyData& d
     if (length != data.vertex_count)
       throw std::invalid_argument("PLY column '" + column.name + "' has another length");
   }
+
   const bool colored = !data.edge_colors.empty();
   if (colored && data.edge_colors.size() != data.edges.size())
     throw std::invalid_argument("PLY edge colours");
@@ -359,6 +360,7 @@ core::Result<void> write_ply(const std::filesystem::path& file, const PlyData& d
         fmt::format("element edge {}\nproperty int vertex1\nproperty int vertex2\n", data.edges.size()));
     if (colored) out.write("property uchar red\nproperty uchar green\nproperty uchar blue\n");
   }
+
   out.write("end_header\n");
 
   for (std::size_t row = 0; row < data.vertex_count; ++row) {

@@ -68,6 +68,7 @@ Json pair_of(const RobotInfo& a, const RobotInfo& b) {
   constexpr double kMostChi2 = 21.67;  // of nine numbers
   const sensor::Pinhole &size_a = a.camera.color, &size_b = b.camera.color;
   Json pair{{"a", a.name}, {"b", b.name}};
+
   if (size_a.width != size_b.width || size_a.height != size_b.height || a.camera.model != b.camera.model) {
     pair.update({{"agree", false}, {"chi2", nullptr}, {"sigmas", nullptr}, {"number", nullptr}});
     pair["text"] = fmt::format("the cameras of {} and {} differ in size or lens", a.name, b.name);
@@ -79,6 +80,7 @@ Json pair_of(const RobotInfo& a, const RobotInfo& b) {
   const optimize::CameraCovariance both = a.estimate->covariance + b.estimate->covariance;
   const optimize::CameraChange sigma = both.diagonal().cwiseSqrt();
   const optimize::CameraChange sigmas = difference.cwiseQuotient(sigma);
+
   const optimize::CameraCovariance correlation =
       sigma.cwiseInverse().asDiagonal() * both * sigma.cwiseInverse().asDiagonal();
   const double chi2 = sigmas.dot(correlation.ldlt().solve(sigmas));
@@ -88,11 +90,13 @@ Json pair_of(const RobotInfo& a, const RobotInfo& b) {
   const char* name = kNames.at(static_cast<std::size_t>(number));
   const bool agree = chi2 <= kMostChi2;
   pair.update({{"agree", agree}, {"chi2", rounded(chi2)}, {"sigmas", rounded(largest)}, {"number", name}});
+
   pair["text"] =
       agree ? fmt::format("{} and {} may share one camera: no number differs by more than {:.1f} sigma",
                           a.name, b.name, largest)
             : fmt::format("{} and {} have different cameras: {} differs by {:.1f} sigma", a.name, b.name,
                           name, largest);
+
   return pair;
 }
 
@@ -109,6 +113,7 @@ Json camera_section(const RobotInfo& robot) {
                        {"wrong", rounded(f.wrong)},
                        {"used", f.used}});
   }
+
   return {{"robot", robot.name},
           {"gain", rounded(known.gain)},
           {"numbers", numbers},
@@ -143,6 +148,7 @@ bool CameraRefinement::ask(const maps::Map& map, const std::vector<maps::FramePo
   const auto found =
       mapping::calibrate_camera({{&map, &frames, robot_.camera.color}}, camera(), options, executor);
   ++known_.answers;
+
   if (robot_.camera.guess) known_.doubt = doubt_of(found);
 
   if (!found) {
@@ -160,17 +166,20 @@ bool CameraRefinement::ask(const maps::Map& map, const std::vector<maps::FramePo
   const bool knows_less = 2 * found->views < known_.views;
   known_.views = std::max(known_.views, found->views);
   const bool better = !knows_less && found->news >= (known_.better ? kLaterNews : mapping::kFileIsWrong);
+
   if (known_.answers > 1 && !better) return false;
   known_.better = better;
   known_.found = found->camera;
   known_.covariance = found->known.covariance;
   known_.wrong = found->known.wrong;
+
   known_.gain = found->gain;
   if (!better) return false;
 
   known_.found.guess = false;
   log.info(fmt::format("{}: the camera is better with {}: the recording fits {:.1f} % better", robot_.name,
                        found_text(found->findings), 100.0 * known_.gain));
+
   return true;
 }
 

@@ -88,6 +88,7 @@ void RobotBodies::bridge(Slams& slams, std::vector<FrameRow>& rows) {
     if (body.motion.gyro_use() != Use::kUsed) continue;
     mapping::Slam& slam = *slams[number];
     std::vector<maps::FramePose> frames = slam.frame_poses();
+
     std::set<std::size_t> numbers;
 
     for (const core::KeyframeId component : components_in(slam)) {
@@ -103,6 +104,7 @@ void RobotBodies::bridge(Slams& slams, std::vector<FrameRow>& rows) {
         if (const auto index = recordings_.frame_at(robot.number, frame.stamp)) numbers.insert(*index);
       }
     }
+
     if (numbers.empty()) continue;
     slam.set_frames(std::move(frames));
 
@@ -146,6 +148,7 @@ void RobotBodies::report(Json& summary) const {
         wheels["agreeing"] = rounded(how->agreeing);
       }
     }
+
     if (section.size() > 1) summary["sensors"].push_back(section);
   }
 

@@ -197,6 +197,7 @@ core::Result<void> fits(const Graph& graph, const MapRequest& request) {
                     "or the pipeline",
                     graph.file.string()));
   }
+
   if (any_stage(graph, &Stage::knows_map) != !request.known_map.empty()) {
     return core::usage_error(fmt::format(
         request.known_map.empty() ? "{}: locates a camera in a map; it is run by plumbline localize"
@@ -208,6 +209,7 @@ core::Result<void> fits(const Graph& graph, const MapRequest& request) {
     return core::usage_error(
         fmt::format("{}: begins with finished maps; it is run by plumbline fuse", graph.file.string()));
   }
+
   return {};
 }
 

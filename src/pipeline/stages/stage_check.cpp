@@ -123,6 +123,7 @@ class CheckStage : public Stage {
         input.frames.push_back(frame);
       }
     }
+
     if (input.frames.empty()) return {};
 
     // Frames are read with the camera that is known now.
@@ -131,9 +132,11 @@ class CheckStage : public Stage {
       if (frame && change[number] != nullptr) return (*change[number])(*frame);
       return frame;
     };
+
     auto report = check::check_path(input, *context_->executor);
     if (!report) return tl::unexpected(report.error());
     report_ = std::move(*report);
+
     return write_samples(*map, robots);
   }
 

@@ -51,6 +51,7 @@ class MapsStage : public Stage {
       const maps::StoredMap& stored = part.run.stored();
       const RobotMap whole{part.name, part.robots, std::make_shared<maps::Map>(stored.map), stored.frames};
       const std::size_t first = result->maps.size();
+
       for (RobotMap& component : components_of(whole).maps) result->maps.push_back(std::move(component));
       if (!into_) continue;
 
@@ -63,6 +64,7 @@ class MapsStage : public Stage {
       std::stable_partition(result->maps.begin(), result->maps.end(),
                             [&](const RobotMap& map) { return map.map->has_keyframe(root); });
     }
+
     io.output<RobotMaps>("maps", result);
     for (const Json& pair : camera_pairs(maps_->robots())) log_->info(pair.at("text").get<std::string>());
     return {};

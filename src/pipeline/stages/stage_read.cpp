@@ -66,11 +66,13 @@ class ReadStage : public Stage {
     if (!frame) {
       const std::size_t reported = unreadable_++;
       const std::string text = fmt::format("frame {} is skipped: {}", io.frame(), frame.error().message);
+
       if (reported < kReportedOneByOne) {
         log_->warning(text);
       } else {
         log_->debug(text);
       }
+
       return {};
     }
 
@@ -79,9 +81,11 @@ class ReadStage : public Stage {
       frame->odometry = geometry::read_by(poses_are_, *frame->odometry);
       ++odometry_;
     }
+
     if (recordings_ != nullptr)
       samples_[static_cast<std::size_t>(recordings_->robot_of(io.frame()))]->add(*frame);
     io.output<sensor::RgbdFrame>("frame", std::make_shared<sensor::RgbdFrame>(std::move(*frame)));
+
     return {};
   }
 

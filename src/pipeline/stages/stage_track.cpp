@@ -63,18 +63,22 @@ class TrackStage : public Stage {
       auto slam = std::make_unique<mapping::Slam>(options_, robot.camera.color, robot.number,
                                                   *context_->executor, *context_->log);
       slam->set_camera(robot.camera);
+
       if (context_->hooks.feedback != nullptr) slam->use(context_->hooks.feedback);
       slam->use(bodies_->sensor(robot.number));
       return slam;
     };
+
     for (const RobotInfo& robot : recordings().robots()) slams_.push_back(begin(robot));
     cameras_.emplace(*context.input.recordings, refine_, pictures_, begin, context);
     unstored_.resize(slams_.size());
     observed_.resize(slams_.size());
     still_.resize(slams_.size());
+
     if (context.resumed != nullptr) restore(*context.resumed);
     stored_robots_ = cameras_->robots();
     stored_news_ = cameras_->news();
+
     return {};
   }
 
@@ -244,9 +248,11 @@ class TrackStage : public Stage {
     const bool news = stored_news_ < cameras_->news();
     stored_news_ = cameras_->news();
     const bool new_camera = std::exchange(unstored.new_camera, false);
+
     if (!new_camera && !news) return;
     for (std::size_t r = 0; r < stored_robots_.size(); ++r)
       stored_robots_[r].estimate = cameras_->robots()[r].estimate;
+
     if (new_camera) {
       stored_robots_[number].versions = cameras_->robots()[number].versions;
       tracked.frames_anew = std::make_shared<std::vector<maps::FramePose>>(slam.frame_poses());

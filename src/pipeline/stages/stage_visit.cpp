@@ -43,16 +43,19 @@ class VisitStage : public Stage {
       if (&part == &context_->input.stored_maps->parts().front()) continue;
       for (const RobotInfo& robot : part.robots) visitors_.insert(robot.number);
     }
+
     for (const core::KeyframeId id : before->map->keyframe_ids()) keyframes_ += visitors_.count(id.robot);
     auto revised = std::make_shared<RevisedClouds>();
     const maps::StoredMap& earlier = context_->input.stored_maps->parts().front().run.stored();
     held_ = hold_earlier(maps::component(earlier.map, maps::main_root(earlier.map, earlier.frames)),
                          visitors_, *result);
+
     if (keyframes_ > 0) {
       if (auto done = revise(*result, *revised); !done) return done;
     }
     result->revised = std::move(revised);
     result_ = result;
+
     io.output<MapResult>("map", result);
     return {};
   }
@@ -108,6 +111,7 @@ class VisitStage : public Stage {
       all.names.push_back(name);
       all.views.push_back(view);
     }
+
     return all;
   }
 

@@ -68,6 +68,7 @@ void set_verdict(std::vector<Doubt> doubts, Json& summary) {
   const std::string reason = gravest(doubts);
   summary["trustworthy"] = reason.empty();
   summary["reason"] = reason;
+
   if (!summary.contains("components")) return;  // no map was made: a camera was located in one
 
   Json shape = Json::array(), coverage = Json::array();

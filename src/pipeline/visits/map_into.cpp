@@ -57,12 +57,14 @@ core::Result<RunSummary> map_into(const MapRequest& request, const core::Executo
   visit.part = PipelinePart::kMapping;
   visit.into_contents = *contents;
   visit.output = visit_folder(request.output);
+
   const auto finished = request.resume ? is_finished(visit.output, request.replace) : false;
   if (!finished) return tl::unexpected(finished.error());
   if (*finished) {
     if (auto same = check_contents(visit.output, *contents); !same) return tl::unexpected(same.error());
   } else {
     const auto mapped = map_recording(visit, executor, log, stop, progress);
+
     if (!mapped) return mapped;
     if (!mapped->reason.empty()) log.warning("the visit by itself: " + mapped->reason);
   }
@@ -72,11 +74,13 @@ core::Result<RunSummary> map_into(const MapRequest& request, const core::Executo
   join.observer = nullptr;
   join.into = request.into;
   join.maps = {visit.output};
+
   join.replace = request.replace || request.resume;
   auto joined = fuse_stored_maps(join, executor, log, core::StopToken(), progress);
   if (!joined) {
     joined.error().message +=
         fmt::format("; the visit is kept in {}: --resume continues", visit.output.string());
+
     return joined;
   }
 

@@ -40,6 +40,7 @@ core::Result<Seen> read_seen(const std::vector<VisitedView>& views, bool of_visi
   for (std::size_t v = 0; v < views.size(); ++v) {
     if (views[v].of_visit == of_visit) seen.views.push_back(v);
   }
+
   seen.rasters.resize(seen.views.size());
   seen.is_depth_view.resize(seen.views.size());
   seen.world_from_cloud.resize(seen.views.size());
@@ -134,6 +135,7 @@ std::vector<float> hidden_beyond(const cloud::DepthRaster& raster, const geometr
   std::vector<float> beyond;
   const cloud::DepthLimits limits(raster);
   const geometry::Rigid3 cloud_from_world = world_from_cloud.inverse();
+
   for (const Eigen::Vector3d& position : surface) {
     const Eigen::Vector3d p = cloud_from_world * position;
     if (limits.evidence(p.cast<float>()) != Evidence::kFree) continue;
@@ -141,6 +143,7 @@ std::vector<float> hidden_beyond(const cloud::DepthRaster& raster, const geometr
     const Eigen::Vector2d pixel = raster.camera.project(p);
     const int column = static_cast<int>(pixel.x()) / cloud::DepthRaster::kCell_px;
     const int row = static_cast<int>(pixel.y()) / cloud::DepthRaster::kCell_px;
+
     for (int k = 0; k < 9; ++k) {
       const int x = column + k % 3 - 1, y = row + k / 3 - 1;
       if (x < 0 || y < 0 || x >= raster.width || y >= raster.height) continue;
@@ -148,6 +151,7 @@ std::vector<float> hidden_beyond(const cloud::DepthRaster& raster, const geometr
       depth = std::min(depth, static_cast<float>(p.z()));
     }
   }
+
   return beyond;
 }
 
@@ -162,6 +166,7 @@ std::vector<std::uint8_t> removed_points(const cloud::Cloud& cloud, const geomet
     if (!(std::isfinite(point.z) && point.z > 0.0F)) continue;
     const Eigen::Vector3d p = point.getVector3fMap().cast<double>();
     bool goes = changes.is_gone(world_from_cloud * p);
+
     const Eigen::Vector2d pixel = raster.camera.project(p);
     if (!goes && !beyond.empty() && raster.camera.contains(pixel, -0.49)) {
       const int column = static_cast<int>(pixel.x() + 0.5) / cloud::DepthRaster::kCell_px;
@@ -169,6 +174,7 @@ std::vector<std::uint8_t> removed_points(const cloud::Cloud& cloud, const geomet
       goes = point.z > beyond[static_cast<std::size_t>(row * raster.width + column)];
     }
     removed[i] = goes ? 1 : 0;
+
     any = any || goes;
   }
   if (!any) removed.clear();
@@ -203,6 +209,7 @@ core::Result<VisitChanges> find_changes(const std::vector<VisitedView>& views, c
   const auto map = read_seen(views, false, read, executor);
   if (!map) return tl::unexpected<core::Error>(map.error());
   const auto visit = read_seen(views, true, read, executor);
+
   if (!visit) return tl::unexpected<core::Error>(visit.error());
 
   VisitChanges changes;
@@ -210,6 +217,7 @@ core::Result<VisitChanges> find_changes(const std::vector<VisitedView>& views, c
   changes.gone = gone_cells(*map, *visit, staying);
   const std::vector<Eigen::Vector3d> surface = new_surface(*visit, staying);
   cloud::CellMap<std::uint32_t> numbers;
+
   for (const Eigen::Vector3d& position : surface)
     numbers.insert({visit_cell(position), static_cast<std::uint32_t>(numbers.size())});
   changes.new_cells = numbers.size();
@@ -221,6 +229,7 @@ core::Result<VisitChanges> find_changes(const std::vector<VisitedView>& views, c
   const auto each = [&](const Seen& seen, std::size_t i) {
     const std::size_t v = seen.views[i];
     const auto cloud = read(v);
+
     if (!cloud) {
       done[v] = tl::unexpected<core::Error>(cloud.error());
     } else if (!views[v].of_visit) {
@@ -231,6 +240,7 @@ core::Result<VisitChanges> find_changes(const std::vector<VisitedView>& views, c
       std::tie(changes.shows[v], changes.share_new[v]) = shown(**cloud, seen.world_from_cloud[i], numbers);
     }
   };
+
   executor.parallel_for(map->views.size(), [&](std::size_t i) { each(*map, i); });
   executor.parallel_for(visit->views.size(), [&](std::size_t i) { each(*visit, i); });
 
@@ -239,6 +249,7 @@ core::Result<VisitChanges> find_changes(const std::vector<VisitedView>& views, c
     changes.gone_points += static_cast<std::size_t>(
         std::count(changes.removed[v].begin(), changes.removed[v].end(), std::uint8_t{1}));
   }
+
   return changes;
 }
 

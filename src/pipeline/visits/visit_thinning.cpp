@@ -111,6 +111,7 @@ void refer_to_others(const maps::Map& map, const std::set<KeyframeId>& gone,
           return std::abs(map.keyframe(x).stamp - frame.stamp) <
                  std::abs(map.keyframe(y).stamp - frame.stamp);
         });
+
     frame.camera_from_reference = frame.camera_from_reference * map.camera_from_world(frame.reference) *
                                   map.camera_from_world(nearest).inverse();
     frame.reference = nearest;
