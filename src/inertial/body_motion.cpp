@@ -102,15 +102,15 @@ void BodyMotion::learn_wheels(const CameraStep& step) {
   stretch_.to = step.to;
 
   // Whole when it is long enough, or turns enough.
-  const double way_m = stretch_.moved.translation.norm();
-  if (way_m < kLeast_m && geometry::rotation_angle(stretch_.moved.rotation) < kLeast_rad) return;
+  const double path_m = stretch_.moved.translation.norm();
+  if (path_m < kLeast_m && geometry::rotation_angle(stretch_.moved.rotation) < kLeast_rad) return;
   const CameraStep whole = std::exchange(stretch_, {});
   const auto from = wheels_at(wheels_, whole.from), to = wheels_at(wheels_, whole.to);
   if (!from || !to) return;
 
   stretches_.push_back({to->inverse() * *from, whole.moved});
-  way_m_ += way_m;
-  if (way_m_ < kLeastWay_m || stretches_.size() < std::max(kFewest, next_wheels_)) return;
+  path_m_ += path_m;
+  if (path_m_ < kLeastWay_m || stretches_.size() < std::max(kFewest, next_wheels_)) return;
   wheel_ =
       calibrate_wheels(stretches_, body_from_camera_.value_or(looks_ahead()), body_from_camera_.has_value());
   next_wheels_ = later(stretches_.size());

@@ -39,7 +39,7 @@ BodyReadings readings_between(const std::vector<ImuReading>& imu,
 class BodySource {
  public:
   virtual ~BodySource() = default;
-  /// As readings_between; of a live source those that have come.
+  /// The readings of readings_between(); a live source has those that have come.
   [[nodiscard]] virtual BodyReadings body_readings(double imu_after, double odometry_after,
                                                    double until) const = 0;
 };

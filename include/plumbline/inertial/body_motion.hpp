@@ -123,7 +123,7 @@ class BodyMotion {
   std::optional<GyroCalibration> gyro_;
   CameraStep stretch_;  ///< of the way, not yet long enough
   std::vector<WheelStretch> stretches_;
-  double way_m_ = 0.0;  ///< of the stretches
+  double path_m_ = 0.0;  ///< of the stretches
   std::size_t next_wheels_ = 0;
   std::optional<WheelCalibration> wheel_;
 };

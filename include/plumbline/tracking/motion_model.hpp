@@ -70,7 +70,9 @@ class MotionModel {
   [[nodiscard]] double search_radius_px() const { return 12.0 + 4.0 * std::min(lost_frames_, 5); }
   /// True if the motion model may still constrain a direction that no measurement constrains.
   [[nodiscard]] bool may_dead_reckon() const {
-    return (continuous() || knows_wheels()) && dead_reckoning_s_ < (knows_wheels() ? 60.0 : knows_odometry() ? 20.0 : 2.5);
+    return (continuous() || knows_wheels()) && dead_reckoning_s_ < (knows_wheels()     ? 60.0
+                                                                    : knows_odometry() ? 20.0
+                                                                                       : 2.5);
   }
   /// True if odometry gives the motion from the last tracked frame to the present one.
   [[nodiscard]] bool knows_odometry() const { return valid_ && odometry_ && last_odometry_; }

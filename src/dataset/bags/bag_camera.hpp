@@ -18,7 +18,7 @@ namespace plumbline::dataset {
 core::Result<std::optional<sensor::CameraReading>> bag_camera(const BagSurvey& survey,
                                                               const ChosenTopics& topics, core::Log& log);
 
-/// How the camera sits in a frame of the robot, by the transforms of the bag; none: they do not say.
+/// Pose of the camera in a frame of the robot by the transforms of the bag; none: they do not tell it.
 std::optional<geometry::Rigid3> body_from_camera(const BagSurvey& survey, const ChosenTopics& topics,
                                                  const std::string& body);
 

@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "bags/bag_camera.hpp"
+#include "bags/body_messages.hpp"
 #include "bags/message_images.hpp"
 #include "bags/topics.hpp"
-#include "body/body_messages.hpp"
 #include "plumbline/core/numbers.hpp"
 
 namespace plumbline::dataset {

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "bags/bag_parts.hpp"
-#include "body/body_messages.hpp"
+#include "bags/body_messages.hpp"
 #include "layout.hpp"
 #include "plumbline/core/git_lfs.hpp"
 #include "plumbline/core/text.hpp"

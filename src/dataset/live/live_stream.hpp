@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "bags/body_messages.hpp"
 #include "bags/message_images.hpp"
-#include "body/body_messages.hpp"
 #include "live/kept_messages.hpp"
 #include "live/live_record.hpp"
 #include "live/live_survey.hpp"

@@ -10,7 +10,7 @@
 
 #include "bags/bag_camera.hpp"
 #include "bags/bag_parts.hpp"
-#include "body/body_messages.hpp"
+#include "bags/body_messages.hpp"
 
 namespace plumbline::dataset {
 namespace {

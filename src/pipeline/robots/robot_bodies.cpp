@@ -56,7 +56,8 @@ void RobotBodies::before(std::int32_t robot, double stamp) {
   inertial::BodyMotion& motion = bodies_[static_cast<std::size_t>(robot)]->motion;
   const auto* source = dynamic_cast<const dataset::BodySource*>(&recordings_.recording(robot));
   if (source != nullptr)
-    motion.add(source->body_readings(motion.last_imu_stamp(), motion.last_odometry_stamp(), stamp + kAhead_s));
+    motion.add(
+        source->body_readings(motion.last_imu_stamp(), motion.last_odometry_stamp(), stamp + kAhead_s));
 }
 
 void RobotBodies::after(std::int32_t robot, const std::vector<maps::FramePose>& poses) {

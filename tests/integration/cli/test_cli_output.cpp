@@ -8,7 +8,7 @@
 namespace plumbline::integration {
 namespace {
 
-const char* const kCheap = " -q --set output.views= --set output.pcd=off --set fuse.voxel=20mm";
+const char* const kWithoutPictures = " -q --set output.views= --set output.pcd=off --set fuse.voxel=20mm";
 /// Slow enough for something to happen meanwhile.
 const char* const kSlow = " --pace 15";
 
@@ -28,18 +28,18 @@ class OutputFolderOfARun : public ProgramTest {
 };
 
 TEST_F(OutputFolderOfARun, WhatAppearsWhileItMapsIsKept) {
-  const Outcome o = run_beside(std::string("map wall -o out") + kCheap + kSlow, "out.partial/map.db",
-                               "mkdir out; echo mine >out/notes.txt");
+  const Outcome o = run_beside(std::string("map wall -o out") + kWithoutPictures + kSlow,
+                               "out.partial/map.db", "mkdir out; echo mine >out/notes.txt");
   EXPECT_EQ(o.code, 5) << o;
   EXPECT_TRUE(o.told("out.partial")) << o;
   EXPECT_EQ(slurp(path("out/notes.txt")), "mine\n");
   EXPECT_TRUE(fs::exists(path("out.partial/summary.json")));
 
   // The result waits until there is room for it.
-  const std::string resume = std::string("map wall -o out --resume") + kCheap;
+  const std::string resume = std::string("map wall -o out --resume") + kWithoutPictures;
   EXPECT_EQ(run(resume).code, 5);
   fs::rename(path("out"), path("mine"));
-  const Outcome fresh = run(std::string("map wall -o out") + kCheap);
+  const Outcome fresh = run(std::string("map wall -o out") + kWithoutPictures);
   EXPECT_EQ(fresh.code, 2) << fresh;
   EXPECT_TRUE(fresh.told("holds a complete result") && fresh.told("--resume")) << fresh;
   ASSERT_EQ(run(resume).code, 0);
@@ -48,7 +48,7 @@ TEST_F(OutputFolderOfARun, WhatAppearsWhileItMapsIsKept) {
 }
 
 TEST_F(OutputFolderOfARun, FilesThatUsersPutIntoAResultAreKept) {
-  const std::string map = std::string("map wall -o out") + kCheap +
+  const std::string map = std::string("map wall -o out") + kWithoutPictures +
                           " --set 'output.exports=[room.las, {file: model, format: colmap}]'";
   ASSERT_EQ(run(map).code, 0);
   ASSERT_EQ(run("report out -q").code, 0);
@@ -70,7 +70,7 @@ TEST_F(OutputFolderOfARun, FilesThatUsersPutIntoAResultAreKept) {
 TEST_F(OutputFolderOfARun, ThatIsRemovedIsAnOutputError) {
   for (const char* commands : {"rm -r out.partial", "mv out.partial moved"}) {
     const Outcome o =
-        run_beside(std::string("map wall -o out") + kCheap + kSlow, "out.partial/map.db", commands);
+        run_beside(std::string("map wall -o out") + kWithoutPictures + kSlow, "out.partial/map.db", commands);
     EXPECT_EQ(o.code, 5) << commands << o;
     EXPECT_TRUE(o.told("was removed or moved away")) << commands << o;
     EXPECT_FALSE(fs::exists(path("out"))) << commands;
@@ -80,7 +80,7 @@ TEST_F(OutputFolderOfARun, ThatIsRemovedIsAnOutputError) {
 }
 
 TEST_F(OutputFolderOfARun, AFusionKeepsWhatAppearsAsWell) {
-  ASSERT_EQ(run(std::string("map wall -o a") + kCheap).code, 0);
+  ASSERT_EQ(run(std::string("map wall -o a") + kWithoutPictures).code, 0);
   fs::copy(path("a"), path("b"), fs::copy_options::recursive);
   const Outcome o = run_beside("fuse a b -o out -q --set output.views=iso", "out.partial/config.yaml",
                                "mkdir out; echo mine >out/notes.txt");
@@ -90,16 +90,16 @@ TEST_F(OutputFolderOfARun, AFusionKeepsWhatAppearsAsWell) {
 }
 
 TEST_F(OutputFolderOfARun, FewFilesOrLittleMemoryAreNoFaultOfTheInput) {
-  const Outcome files =
-      run(std::string("map wall -o out") + kCheap, "prlimit --nofile=8 ");  // the shell itself needs more
+  const Outcome files = run(std::string("map wall -o out") + kWithoutPictures,
+                            "prlimit --nofile=8 ");  // the shell itself needs more
   EXPECT_EQ(files.code, 5) << files;
   EXPECT_TRUE(files.told("ulimit -n")) << files;
 
   // Address spaces from hardly enough to start with to nearly enough.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   for (const std::string mb : {"250", "300", "500"}) {
-    const Outcome o =
-        run("map wall -o out --threads 1 --force" + std::string(kCheap), "ulimit -v " + mb + "000; ");
+    const Outcome o = run("map wall -o out --threads 1 --force" + std::string(kWithoutPictures),
+                          "ulimit -v " + mb + "000; ");
     const bool not_started = o.code == 127;  // the dynamic linker's own words
     EXPECT_TRUE(o.code == 0 || o.code == 5 || not_started) << mb << o;
     EXPECT_TRUE(o.code != 5 || o.told("not enough memory") || o.told("no further thread")) << mb << o;

@@ -5,7 +5,7 @@
 #include <cstring>
 
 #include "bags/bag_parts.hpp"
-#include "body/body_messages.hpp"
+#include "bags/body_messages.hpp"
 #include "test_dataset_world.hpp"
 
 namespace plumbline::dataset {

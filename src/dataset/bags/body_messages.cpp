@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "body/body_messages.hpp"
+#include "bags/body_messages.hpp"
 
 #include <fmt/format.h>
 
