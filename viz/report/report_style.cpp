@@ -62,7 +62,8 @@ font:12.5px/1.45 ui-monospace,"DejaVu Sans Mono",Menlo,Consolas,monospace}
 footer{margin-top:3em;color:var(--muted);font-size:.85em;border-top:1px solid var(--rule);padding-top:.8em}
 @media(max-width:640px){.facts th{white-space:normal}.pictures{grid-template-columns:1fr}main{padding:1.2em .8em}}
 @page{margin:14mm}
-@media print{.screen,section:has(>.pv):not(:has(>.pv-paper)){display:none}.plans img{max-height:225mm}.plan img{max-height:125mm;object-fit:contain}
+@media print{.screen,section:has(>.pv):not(:has(>.pv-paper)){display:none}.plans img{max-height:225mm}.plan img{max-height:105mm;object-fit:contain;border:0}
+.plan{margin:.6em 0}.half table{font-size:.78em}.half{margin-right:2em}.half h3{margin:.2em 0}
 header{break-after:page}
 body{font-size:10.5pt}main{max-width:none;padding:0}nav{display:none}section{margin-top:1.4em}
 *{-webkit-print-color-adjust:exact;print-color-adjust:exact}h2,h3{break-after:avoid}
