@@ -60,8 +60,9 @@ class ExportPlan : public ExportTest {
   /// Ends of the lines of a layer of plan.dxf: x y x y.
   [[nodiscard]] std::vector<std::array<double, 4>> lines(const std::string& layer) const {
     const std::string dxf = bytes("plan.dxf");
-    const std::regex line("  8\n" + layer +
-                          "\n100\nAcDbLine\n 10\n(.*)\n 20\n(.*)\n 30\n.*\n 11\n(.*)\n 21\n(.*)\n");
+    const std::regex line(
+        "  8\n" + layer +
+        "\n(?:  6\n.*\n)?100\nAcDbLine\n 10\n(.*)\n 20\n(.*)\n 30\n.*\n 11\n(.*)\n 21\n(.*)\n");
     std::vector<std::array<double, 4>> found;
     for (std::sregex_iterator it(dxf.begin(), dxf.end(), line), end; it != end; ++it)
       found.push_back({std::stod((*it)[1]), std::stod((*it)[2]), std::stod((*it)[3]), std::stod((*it)[4])});
@@ -105,7 +106,7 @@ TEST_F(ExportPlan, FindsTheFloorAndWallsAtLargeCoordinates) {
     wanted.given = {"storey"};
     const auto summary = write(wanted);
     ASSERT_TRUE(summary) << summary.error().message;
-    EXPECT_EQ(summary->notes.front(), "8 walls, 1 doors, 2 closed rooms");
+    EXPECT_EQ(summary->notes.front(), "storey 0: 8 walls, 1 doors, 2 closed rooms");
     EXPECT_NE(bytes("plan.dxf").find("691004."), std::string::npos);
   }
 }
