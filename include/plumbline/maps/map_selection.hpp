@@ -8,8 +8,8 @@
 
 namespace plumbline::maps {
 
-/// The map without these keyframes, none of which is a root: their children are attached to the nearest ancestor
-/// that stays, and landmarks that only they saw are left out.
+/// The map without these keyframes, none of which is a root: their children are attached to the nearest
+/// ancestor that stays, and landmarks that only they saw are left out.
 [[nodiscard]] Map without(const Map& map, const std::set<core::KeyframeId>& keyframes);
 
 }  // namespace plumbline::maps

@@ -84,6 +84,7 @@ void add_hub(CLI::App& app, Session& session) {
   command->add_option("--quota", *quota_gb, "Disk space for the map of each robot, GB (default: 20)")
       ->type_name("GB")
       ->check(CLI::PositiveNumber);
+
   command->add_option("--anchor", request->fuse.anchor, "Robot whose map defines the frame of the result")
       ->type_name("NAME");
   command
@@ -91,6 +92,7 @@ void add_hub(CLI::App& app, Session& session) {
           "--into", request->fuse.into,
           "Finished map (result folder or map.db) that all robots visit, as for map; it stays as it is")
       ->type_name("MAP");
+
   command->add_flag("--resume", request->resume, "Continue an interrupted hub from OUT.partial");
   add_pipeline_options(*command, session, request->fuse);
 }

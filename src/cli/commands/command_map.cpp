@@ -151,6 +151,7 @@ void add_map(CLI::App& app, Session& session) {
           "Another visit of this map (result folder or map.db), which stays as it is: OUT holds both, in "
           "its frame, without what is gone")
       ->type_name("MAP");
+
   add_frames_options(*command, *publish);
   add_map_options(*command, session, *request);
   add_live_options(*command, *page);

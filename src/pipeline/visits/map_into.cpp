@@ -57,6 +57,7 @@ core::Result<RunSummary> map_into(const MapRequest& request, const core::Executo
   visit.part = PipelinePart::kMapping;
   visit.into_contents = *contents;
   visit.output = visit_folder(request.output);
+
   const auto finished = request.resume ? is_finished(visit.output, request.replace) : false;
   if (!finished) return tl::unexpected(finished.error());
   if (*finished) {
@@ -69,10 +70,12 @@ core::Result<RunSummary> map_into(const MapRequest& request, const core::Executo
 
   FuseRequest join;
   static_cast<RunRequest&>(join) = request;
+
   join.observer = nullptr;
   join.into = request.into;
   join.maps = {visit.output};
   join.replace = request.replace || request.resume;
+
   auto joined = fuse_stored_maps(join, executor, log, core::StopToken(), progress);
   if (!joined) {
     joined.error().message +=
