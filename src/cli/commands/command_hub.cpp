@@ -88,6 +88,7 @@ void add_hub(CLI::App& app, Session& session) {
   command->add_option("--quota", *quota_gb, "Disk space for the map of each robot, GB (default: 20)")
       ->type_name("GB")
       ->check(CLI::PositiveNumber);
+
   command->add_option("--anchor", request->fuse.anchor, "Robot whose map defines the frame of the result")
       ->type_name("NAME");
 

@@ -36,6 +36,7 @@ void remove(const std::set<RevisedClouds::View>& left_out, maps::StoredViews& vi
   kept.robots.clear();
   kept.stamps.clear();
   kept.velocities.clear();
+
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (left_out.count({views.keyframes[i], views.frames[i]}) != 0) continue;
     kept.keyframes.push_back(views.keyframes[i]);

@@ -50,6 +50,7 @@ class MapsStage : public Stage {
     for (const maps::StoredPart& part : maps_->parts()) {
       const maps::StoredMap& stored = part.run.stored();
       const RobotMap whole{part.name, part.robots, std::make_shared<maps::Map>(stored.map), stored.frames};
+
       const std::size_t first = result->maps.size();
 
       for (RobotMap& component : components_of(whole).maps) result->maps.push_back(std::move(component));

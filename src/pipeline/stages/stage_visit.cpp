@@ -46,6 +46,7 @@ class VisitStage : public Stage {
 
     for (const core::KeyframeId id : before->map->keyframe_ids()) keyframes_ += visitors_.count(id.robot);
     auto revised = std::make_shared<RevisedClouds>();
+
     const maps::StoredMap& earlier = context_->input.stored_maps->parts().front().run.stored();
     held_ = hold_earlier(maps::component(earlier.map, maps::main_root(earlier.map, earlier.frames)),
                          visitors_, *result);
@@ -53,6 +54,7 @@ class VisitStage : public Stage {
     if (keyframes_ > 0) {
       if (auto done = revise(*result, *revised); !done) return done;
     }
+
     result->revised = std::move(revised);
     result_ = result;
 
@@ -93,6 +95,7 @@ class VisitStage : public Stage {
     for (const maps::StoredCloud& cloud : context_->input.stored_maps->clouds()) {
       const maps::StoredViews& views = context_->input.stored_maps->views_of(cloud);
       const View name{views.keyframes[cloud.view], views.frames[cloud.view]};
+
       VisitedView view;
       if (name.first.valid()) {
         if (!map.map->has_keyframe(name.first)) continue;
@@ -168,6 +171,7 @@ class VisitStage : public Stage {
       const std::int32_t number = numbers[frame.reference.robot]++;
       if (redundant.count(frame.reference) != 0) frames.insert({frame.reference.robot, number});
     }
+
     for (const View& name : all.names) {
       if (name.first.valid() ? redundant.count(name.first) != 0 : frames.count(name.second) != 0)
         revised.left_out.insert(name);

@@ -71,11 +71,13 @@ core::Result<RunSummary> map_into(const MapRequest& request, const core::Executo
 
   FuseRequest join;
   static_cast<RunRequest&>(join) = request;
+
   join.observer = nullptr;
   join.into = request.into;
   join.maps = {visit.output};
 
   join.replace = request.replace || request.resume;
+
   auto joined = fuse_stored_maps(join, executor, log, core::StopToken(), progress);
   if (!joined) {
     joined.error().message +=

@@ -27,6 +27,7 @@ core::Result<maps::StoreCloud> RevisedClouds::stored(const maps::StoredViews& vi
   const View name{views.keyframes[view], views.frames[view]};
   auto bytes = views.bytes(view);
   if (!bytes) return tl::unexpected<core::Error>(bytes.error());
+
   maps::StoreCloud result{name.first, name.second, nullptr, nullptr};
 
   if (removed.count(name) == 0) {
@@ -41,6 +42,7 @@ core::Result<maps::StoreCloud> RevisedClouds::stored(const maps::StoredViews& vi
   if (!cloud) return tl::unexpected<core::Error>(cloud.error());
   apply(name, **cloud);
   result.bytes = std::make_shared<std::vector<std::uint8_t>>(cloud::encode_cloud(**cloud));
+
   if (name.first.valid()) {
     result.surface = std::make_shared<maps::StoredSurface>(
         maps::StoredSurface{kSurfaceVoxel_m, mapping::coarse_surface(**cloud, kSurfaceVoxel_m)});

@@ -47,6 +47,7 @@ core::Result<Seen> read_seen(const std::vector<VisitedView>& views, bool of_visi
 
   cloud::VoxelMapOptions options;
   options.voxel_m = kVisitCell_m;
+
   cloud::VoxelMap voxels(options);
   const Eigen::AlignedBox3i everywhere(Eigen::Vector3i::Constant(-(1 << 20)),
                                        Eigen::Vector3i::Constant(1 << 20));
@@ -86,6 +87,7 @@ std::vector<std::uint8_t> not_there(const std::vector<cloud::FusedPoint>& points
   const cloud::Surfels surfels(points, 2.0 * kVisitCell_m);
   const std::vector<std::uint8_t> goes =
       cloud::seen_through(surfels, visit.rasters, visit.is_depth_view, visit.world_from_cloud);
+
   std::vector<std::uint8_t> result(points.size(), 0);
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (surfels.of(i) != cloud::Surfels::kNone) result[i] = goes[surfels.of(i)];
@@ -139,8 +141,11 @@ std::vector<float> hidden_beyond(const cloud::DepthRaster& raster, const geometr
   for (const Eigen::Vector3d& position : surface) {
     const Eigen::Vector3d p = cloud_from_world * position;
     if (limits.evidence(p.cast<float>()) != Evidence::kFree) continue;
+
     if (beyond.empty()) beyond.assign(raster.nearest.size(), std::numeric_limits<float>::infinity());
+
     const Eigen::Vector2d pixel = raster.camera.project(p);
+
     const int column = static_cast<int>(pixel.x()) / cloud::DepthRaster::kCell_px;
     const int row = static_cast<int>(pixel.y()) / cloud::DepthRaster::kCell_px;
 
@@ -165,6 +170,7 @@ std::vector<std::uint8_t> removed_points(const cloud::Cloud& cloud, const geomet
     const cloud::Point& point = cloud[i];
     if (!(std::isfinite(point.z) && point.z > 0.0F)) continue;
     const Eigen::Vector3d p = point.getVector3fMap().cast<double>();
+
     bool goes = changes.is_gone(world_from_cloud * p);
 
     const Eigen::Vector2d pixel = raster.camera.project(p);
@@ -173,6 +179,7 @@ std::vector<std::uint8_t> removed_points(const cloud::Cloud& cloud, const geomet
       const int row = static_cast<int>(pixel.y() + 0.5) / cloud::DepthRaster::kCell_px;
       goes = point.z > beyond[static_cast<std::size_t>(row * raster.width + column)];
     }
+
     removed[i] = goes ? 1 : 0;
 
     any = any || goes;
@@ -191,6 +198,7 @@ std::pair<std::vector<std::uint32_t>, double> shown(const cloud::Cloud& cloud,
     if (!std::isfinite(point.z)) continue;
     const std::uint64_t cell = visit_cell(world_from_cloud * point.getVector3fMap().cast<double>());
     if (!all.insert({cell, 1}).second) continue;
+
     const auto found = numbers.find(cell);
     if (found != numbers.end()) result.push_back(found->second);
   }
@@ -208,6 +216,7 @@ core::Result<VisitChanges> find_changes(const std::vector<VisitedView>& views, c
                                         const core::Executor& executor) {
   const auto map = read_seen(views, false, read, executor);
   if (!map) return tl::unexpected<core::Error>(map.error());
+
   const auto visit = read_seen(views, true, read, executor);
 
   if (!visit) return tl::unexpected<core::Error>(visit.error());
@@ -215,6 +224,7 @@ core::Result<VisitChanges> find_changes(const std::vector<VisitedView>& views, c
   VisitChanges changes;
   Cells staying;
   changes.gone = gone_cells(*map, *visit, staying);
+
   const std::vector<Eigen::Vector3d> surface = new_surface(*visit, staying);
   cloud::CellMap<std::uint32_t> numbers;
 
@@ -226,6 +236,7 @@ core::Result<VisitChanges> find_changes(const std::vector<VisitedView>& views, c
   changes.shows.resize(views.size());
   changes.share_new.resize(views.size(), 0.0);
   std::vector<core::Result<void>> done(views.size());
+
   const auto each = [&](const Seen& seen, std::size_t i) {
     const std::size_t v = seen.views[i];
     const auto cloud = read(v);

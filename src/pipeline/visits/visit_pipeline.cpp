@@ -22,11 +22,13 @@ std::string part_as_yaml(const Graph& graph, const std::set<std::string>& types,
   for (const Node& node : graph.nodes) {
     if (node.tap || types.count(node.type->name) == 0) continue;
     text += fmt::format("  {}:\n    type: {}\n", node.name, node.type->name);
+
     std::vector<std::string> inputs;
     for (std::size_t i = 0; i < node.inputs.size(); ++i) {
       const std::string source = node.inputs[i] ? source_of(node, i) : std::string();
       if (!source.empty()) inputs.push_back(fmt::format("{}: {}", node.type->inputs[i].name, source));
     }
+
     if (!inputs.empty()) text += fmt::format("    inputs: {{{}}}\n", fmt::join(inputs, ", "));
     for (const core::OptionSpec& spec : node.options.specs())
       text += fmt::format("    {}: {}\n", spec.key, node.options.value(spec.key));
@@ -84,6 +86,7 @@ core::Result<std::string> joining_part(const Graph& graph) {
   text += part_as_yaml(graph, types, [&](const Node& node, std::size_t i) -> std::string {
     const Port& port = node.type->inputs[i];
     const OutputRef& from = *node.inputs[i];
+
     if (port.type == keyframe_cloud_port()) return "maps.cloud";
     if (port.type == maps_port()) return "maps.maps";
     if (port.type == map_port() && node.type->name != "refine") return std::string(kVisitStage) + ".map";

@@ -68,6 +68,7 @@ std::set<KeyframeId> redundant_keyframes(const maps::Map& map, const std::set<st
   KeptPoses poses(options);
   std::vector<int> covered(changes.new_cells, 0);  // keyframes that show a new cell
   std::set<std::int32_t> begun;
+
   for (const KeyframeId id : map.keyframe_ids()) {
     if (visitors.count(id.robot) == 0) poses.add(map.camera_from_world(id));
   }
@@ -89,6 +90,7 @@ std::set<KeyframeId> redundant_keyframes(const maps::Map& map, const std::set<st
       redundant.insert(id);
       continue;
     }
+
     poses.add(map.camera_from_world(id));
     if (view == views.end()) continue;
     for (const std::uint32_t cell : changes.shows[view->second]) ++covered[cell];
@@ -106,6 +108,7 @@ void refer_to_others(const maps::Map& map, const std::set<KeyframeId>& gone,
   for (maps::FramePose& frame : frames) {
     if (gone.count(frame.reference) == 0) continue;
     const std::vector<KeyframeId>& others = kept.at(frame.reference.robot);
+
     const KeyframeId nearest =
         *std::min_element(others.begin(), others.end(), [&](KeyframeId x, KeyframeId y) {
           return std::abs(map.keyframe(x).stamp - frame.stamp) <
@@ -122,6 +125,7 @@ void refer_to_others(const maps::Map& map, const std::set<KeyframeId>& gone,
 void remove_gone(const VisitChanges& changes, const std::set<std::int32_t>& visitors, maps::Map& map) {
   remove_gone_landmarks(map.point_ids(), changes, visitors, map);
   remove_gone_landmarks(map.line_ids(), changes, visitors, map);
+
   for (const KeyframeId id : map.keyframe_ids()) {
     if (visitors.count(id.robot) != 0) continue;
     const geometry::Rigid3 world_from_camera = map.camera_from_world(id).inverse();
