@@ -43,27 +43,23 @@ void ExportOptions::declare(core::OptionTable& table) {
   table.number("cut", cut_m, {0.0, 100.0}, "m", "Height of the cut over the floor");
   table.numbers("section", section, 0, {-kFar_m, kFar_m}, "m",
                 "Draw a vertical section along the line x,y,x,y instead of the plan");
-  constexpr auto kMayBeEmpty = core::EmptyValue::kAllowed;
 
   table.choice("paper", paper, {"auto", "A4", "A3", "A2", "A1", "A0"},
                "Paper of a plan; auto: A3, or the next that holds it");
   table.text("scale", scale,
              "Scale of a plan, such as 1:50; auto: the largest of 1:20, 1:50, 1:100, 1:200 that fits");
-  table.text("title", title, "Title of a plan; empty: the map's name", kMayBeEmpty);
-  table.text("client", client, "Client, for a plan's title block; empty: none", kMayBeEmpty);
-  table.text("address", address, "Address, for a plan's title block; empty: none", kMayBeEmpty);
+  table.text("title", title, "Title of a plan; empty: the map's name");
+  table.text("client", client, "Client, for a plan's title block; empty: none");
+  table.text("address", address, "Address, for a plan's title block; empty: none");
 
   table.text("date", date,
-             "Date of the recording, for a plan's title block; empty: that of its stamps, if they tell one",
-             kMayBeEmpty);
-  table.text("title_block", title_block, "YAML file with texts of a plan's title block; empty: none",
-             kMayBeEmpty);
+             "Date of the recording, for a plan's title block; empty: that of its stamps, if they tell one");
+  table.text("title_block", title_block, "YAML file with texts of a plan's title block; empty: none");
   table.choice("decimal", decimal, {"point", "comma"}, "Decimal sign of a plan");
 
-  table.text(
-      "without", without,
-      "Layers that a plan leaves out: wall, patt, assm, door, glaz, area, furn, dims, grid, anno, path; none",
-      kMayBeEmpty);
+  table.text("without", without,
+             "Layers that a plan leaves out: wall, patt, assm, door, glaz, area, furn, dims, grid, anno, "
+             "path; none");
   table.numbers("body", body, 0, {-1e4, 1e4}, "",
                 "Pose of the camera in the body, x,y,z,qx,qy,qz,qw, to write the path of the body");
 }

@@ -39,7 +39,6 @@ const Keys kAdvanced{
              "icp.max_turn adjust.observations adjust.iterations adjust.aligned_sigma adjust.line_sigma "
              "adjust.depth_factor adjust.surface_weight adjust.turn_rate adjust.gate")},
     {"fuse", keys_in("min_cos_incidence")},
-    {"visit", keys_in("share_new views cells apart turned")},
 };
 
 /// Options without a known use: accepted, but not listed anywhere.
@@ -49,8 +48,9 @@ const Keys kInternal{
      keys_in(
          "local.overlap_angle keyframe.cone_min_change landmark.min_visible landmark.min_age "
          "triangulate.max_sigma triangulate.line_views bundle.rounds surface.max_incidence vocabulary.split "
-         "places.min_absolute places.votes places.consistent verify.min_found verify.min_evidence "
-         "verify.min_cells keyframe.cone_balance keyframe.cone_scaled keyframe.urgent thumbnails "
+         "places.min_score places.min_absolute places.votes places.consistent verify.min_found "
+         "verify.min_evidence verify.min_cells keyframe.cone_balance keyframe.cone_scaled keyframe.urgent "
+         "thumbnails "
          "motion_prior pnp_start landmark.by_keyframes bundle.depth_rows "
          "solver.depth_rows verify.depth_rows verify.align verify.joint match.min_line_ratio")},
     {"localize",
@@ -66,8 +66,9 @@ const Keys kInternal{
              "robust vocabulary.branching vocabulary.levels vocabulary.split "
              "places.min_score places.min_absolute places.votes places.consistent verify.min_inliers "
              "verify.min_overlap verify.max_contradiction verify.min_found verify.min_evidence "
-             "verify.min_cells verify.depth_rows verify.align verify.joint")},
-    {"refine", keys_in("adjust.depth_rows local_map.angle icp.min_information")},
+             "verify.min_cells verify.rounds verify.depth_rows verify.align verify.joint")},
+    {"refine", keys_in("adjust.depth_rows local_map.angle local_map.voxel icp.min_information")},
+    {"visit", keys_in("share_new views cells apart turned")},
 };
 
 bool lists(const Keys& keys, const std::string& stage, const std::string& key) {

@@ -223,10 +223,10 @@ class Result:
         (metres) and a turn (radians) in the camera's axes. Raises InputError: the path was not checked."""
         file = self.folder / "pose_samples.npy"
         try:
-            records = np.load(file)
+            records: npt.NDArray[Any] = np.load(file)
         except (OSError, ValueError) as problem:
             raise _core.InputError(f"{file}: cannot be read: {problem}; results whose path was checked have it") from problem
-        return records["motion"]
+        return np.asarray(records["motion"], np.float32)
 
     def length(self, points: npt.ArrayLike, seen: Optional[npt.ArrayLike] = None, sigma: npt.ArrayLike = 0.0) -> Length:
         """Length of the line through P x 3 points of the map, with its 95 %: what errors of the poses and of the points can change.

@@ -15,9 +15,9 @@ class Compare : public ProgramTest {
                                out + " -q --set output.views= --set output.pcd=off --set fuse.voxel=2cm");
     ASSERT_EQ(mapped.code, 0) << mapped;
   }
-  /// A parcel less and a table elsewhere.
+  /// A chair less and a table elsewhere.
   void map_two_days() const {
-    std::ofstream(path("edits.yaml")) << "- {remove: parcel}\n- {move: coffee table, by: [0.3, 0.2]}\n";
+    std::ofstream(path("edits.yaml")) << "- {remove: chair 19}\n- {move: coffee table, by: [0.3, 0.2]}\n";
     map("", "a");
     map("&changes=" + path("edits.yaml").string(), "b");
   }

@@ -58,7 +58,8 @@ class Report : public ProgramTest {
     EXPECT_EQ(count_of("<script>", html), viewers);
     EXPECT_EQ(count_of("<script ", html),
               count_of("class=\"pv-scene\"", html) + count_of("class=\"pv-data\"", html));
-    EXPECT_EQ(count_of(" src=\"", html), count_of(" src=\"data:image/png;base64,", html));
+    EXPECT_EQ(count_of(" src=\"", html), count_of(" src=\"data:image/png;base64,", html) +
+                                             count_of(" src=\"data:image/svg+xml;base64,", html));
     EXPECT_EQ(count_of(" href=\"", html),
               count_of(" href=\"#", html) + count_of(" href=\"data:image/png;base64,", html));
     for (const char* number : {">nan", ",nan", "nan,", "\"nan", " nan ", "inf,", ",inf"}) {
@@ -92,7 +93,7 @@ TEST_F(Report, TellsWhatWasMapped) {
         "Bounding box", "loop to close", "frames.csv", "plumbline 0.", "config.yaml", "type: track"}) {
     EXPECT_TRUE(has(html, text)) << text;
   }
-  EXPECT_EQ(count_of("<img ", html), 3U);
+  EXPECT_EQ(count_of("<img ", html), 4U);
   EXPECT_FALSE(has(html, "id=\"merges\"") || has(html, "id=\"accuracy\"") ||
                has(html, "Missing in this report"));
   const std::size_t points = read_json(path("out/summary.json"))["cloud"]["points"];
@@ -224,14 +225,14 @@ TEST_F(Report, TellsOfSeveralRobots) {
     EXPECT_TRUE(has(html, text)) << text;
   }
   EXPECT_EQ(count_of("class=\"line loop\"", html), 2U);  // curve and legend
-  EXPECT_EQ(count_of("<img ", html), 3U);                // drawn, since the folder has none
+  EXPECT_EQ(count_of("<img ", html), 4U);                // the plan, and pictures: the folder has none
   EXPECT_FALSE(has(html, "Missing in this report") || has(html, "id=\"tracking\""));
 }
 
 TEST_F(Report, WhatIsMissingIsTold) {
   map_wall("--set output.views=");
   const std::string drawn = page("out");
-  EXPECT_EQ(count_of("<img ", drawn), 3U);
+  EXPECT_EQ(count_of("<img ", drawn), 4U);
   EXPECT_EQ(drawn, page("out"));
   write("out/trajectory.txt", "10 nan 0 0 0 0 0 1\n");
   write("out/timing.csv", "frame,stamp\n0,1,2\n");

@@ -34,8 +34,9 @@ def write_ply(file, points, normals):
 
 
 def room(random, shift):
-    """Floor, three walls and a box, each centimetre about, with noise that grows along x."""
-    faces = [([0, 0, 0], [4, 0, 0], [0, 3, 0]), ([4, 3 - shift, 0], [-4, 0, 0], [0, 0, 2]), ([0, 3, 0], [0, -3, 0], [0, 0, 2]),
+    """Floor, four walls, the lowest of which shifts, and a box, each centimetre about, with noise that grows along x."""
+    faces = [([0, 0, 0], [4, 0, 0], [0, 3, 0]), ([4, 3 - shift, 0], [-4, 0, 0], [0, 0, 1.2]), ([0, 3, 0], [0, -3, 0], [0, 0, 2]),
+             ([0, 0, 0], [4, 0, 0], [0, 0, 2]),
              ([4, 0, 0], [0, 3, 0], [0, 0, 2]), ([1, 1, 0], [0.8, 0, 0], [0, 0, 0.6]), ([1, 1, 0.6], [0.8, 0, 0], [0, 0.5, 0])]
     points, normals = [], []
     for corner, u, v in np.array(faces, float):

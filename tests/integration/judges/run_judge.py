@@ -412,8 +412,9 @@ def case_plan(case):
 
 def case_dxf(case):
     need_ezdxf()
-    print(run(SYSTEM_PYTHON, HERE / "judge_dxf.py", case.export("room.dxf")).strip())
-    print(run(SYSTEM_PYTHON, HERE / "judge_dxf.py", case.export("world.dxf", "--datum", "52.5,13.4,30")).strip())
+    sides = [] if case.name == "office" else ["one-sided"]
+    print(run(SYSTEM_PYTHON, HERE / "judge_dxf.py", case.export("room.dxf"), *sides).strip())
+    print(run(SYSTEM_PYTHON, HERE / "judge_dxf.py", case.export("world.dxf", "--datum", "52.5,13.4,30"), "grid", *sides).strip())
 
 
 def need_ezdxf():
