@@ -147,7 +147,8 @@ Fit start(const Samples& thing, const Eigen::Vector3d& to, double turn, const Ei
 Fit best_place(const Samples& thing, const Ground& ground, const std::vector<Eigen::Vector3d>& targets,
                const Eigen::Vector3d& up) {
   constexpr int kTurns = 12;  // of 15 degrees, each way
-  constexpr double kStep_m = 0.1, kRange_m = 0.6;
+  constexpr double kStep_m = 0.1;
+  constexpr int kSteps = 6;  // each way
   constexpr std::size_t kSettled = 12;
   std::vector<Fit> fits;
 
@@ -155,9 +156,9 @@ Fit best_place(const Samples& thing, const Ground& ground, const std::vector<Eig
     for (int t = -kTurns + 1; t <= kTurns; ++t) fits.push_back(start(thing, target, M_PI / kTurns * t, up));
   }
   const Eigen::Vector3d x = up.unitOrthogonal(), y = up.cross(x), middle = middle_of(thing);
-  for (double a = -kRange_m; a <= kRange_m + 1e-9; a += kStep_m) {
-    for (double b = -kRange_m; b <= kRange_m + 1e-9; b += kStep_m) {
-      if (std::hypot(a, b) > 0.05) fits.push_back(start(thing, middle + a * x + b * y, 0.0, up));
+  for (int a = -kSteps; a <= kSteps; ++a) {
+    for (int b = -kSteps; b <= kSteps; ++b) {
+      if (a != 0 || b != 0) fits.push_back(start(thing, middle + kStep_m * (a * x + b * y), 0.0, up));
     }
   }
 
