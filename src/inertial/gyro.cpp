@@ -175,6 +175,7 @@ std::optional<GyroCalibration> calibrate_gyro(const TurnRates& rates, const std:
                         : (pair[0].camera - found.camera_from_imu * (pair[0].sensor - found.bias)).norm();
   };
   std::vector<double> offs;
+  offs.reserve(steps.size());
   for (const CameraStep& step : steps) offs.push_back(off(step));
 
   const double limit = std::max(kLeast, kOutlier * core::quantile(offs, 0.5, 0.0));

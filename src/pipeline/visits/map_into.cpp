@@ -63,8 +63,7 @@ core::Result<RunSummary> map_into(const MapRequest& request, const core::Executo
   if (*finished) {
     if (auto same = check_contents(visit.output, *contents); !same) return tl::unexpected(same.error());
   } else {
-    const auto mapped = map_recording(visit, executor, log, stop, progress);
-
+    auto mapped = map_recording(visit, executor, log, stop, progress);
     if (!mapped) return mapped;
     if (!mapped->reason.empty()) log.warning("the visit by itself: " + mapped->reason);
   }
