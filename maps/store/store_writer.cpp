@@ -364,9 +364,11 @@ core::Result<void> StoreWriter::add(const StoreStep& step) {
         impl_->put_seen({pose.reference.robot, static_cast<std::int32_t>(list.size())}, *pose.seen);
       list.push_back(pose);
     }
+
     for (const auto& [robot, size] : before) {
       mirror_list(robot, impl_->frame_lists[robot], size, impl_->frames);
     }
+
     impl_->put_extras(step);
     if (step.robots != nullptr) impl_->put_robots_of_map(*step.robots);
     impl_->put_map(*step.map, step.robot);

@@ -88,12 +88,14 @@ core::Result<cloud::CloudPtr> read_inputs(const FilterRequest& request, cloud::C
     if (!file) return tl::unexpected<core::Error>(file.error());
     file->frame = maps::frame_of_cloud(request.files[i], file->frame);
 
+    // The first one defines the frame.
     if (all == nullptr) {
       all = std::move(file->cloud);
       columns = std::move(file->columns);
       shift = file->shift;
       frame = std::move(file->frame);
     } else {
+      // The others must fit into it.
       auto fits = cloud::check_one_frame(request.files.front().string(), shift, request.files[i].string(),
                                          file->shift);
       if (fits)
