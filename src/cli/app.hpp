@@ -81,7 +81,9 @@ struct PublishRequest {
   std::string address;  ///< of --publish; "": nothing
   std::string frames;   ///< of --frames
   net::OdomTf odom_tf = net::OdomTf::kAuto;
-  std::size_t robots = 1;  ///< of the run
+  std::size_t robots = 1;                         ///< of the run
+  bool finished_map = false;                      ///< poses are in a finished map
+  std::vector<double> grid_heights = {0.1, 1.8};  ///< of --grid-heights, metres
 };
 /// --publish, --frames and --odom-tf, for commands that map.
 void add_frames_options(CLI::App& command, PublishRequest& publish);

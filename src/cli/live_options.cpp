@@ -46,6 +46,13 @@ void add_frames_options(CLI::App& command, PublishRequest& publish) {
       ->transform(one_of<net::OdomTf>(
           {{"own", net::OdomTf::kOwn}, {"other", net::OdomTf::kOther}, {"auto", net::OdomTf::kAuto}}))
       ->type_name("own|other|auto");
+  command
+      .add_option("--grid-heights", publish.grid_heights,
+                  "With a base: heights over its origin, in metres, between which things are obstacles in "
+                  "the occupancy grid")
+      ->type_name("LOW,HIGH")
+      ->delimiter(',')
+      ->expected(2);
 }
 
 core::Result<void> prepare_publisher(Session& session, const PublishRequest& publish,
@@ -66,6 +73,10 @@ core::Result<void> prepare_publisher(Session& session, const PublishRequest& pub
   }
 
   frames->odom_tf = publish.odom_tf;
+  frames->finished_map = publish.finished_map;
+  frames->grid_heights = {publish.grid_heights[0], publish.grid_heights[1]};
+  if (publish.grid_heights[0] >= publish.grid_heights[1])
+    return core::usage_error("--grid-heights: takes two heights, the lower first");
   auto publisher = net::open_ros2_publisher(publish.address, names, name, *frames, session.console());
   if (!publisher) return tl::unexpected<core::Error>(publisher.error());
   request.observer = std::move(*publisher);

@@ -188,7 +188,7 @@ class Mapping(Folder):
                 mapper.feed(*arguments)
         with self.assertRaisesRegex(TypeError, r"feed\(color, depth, stamp\) .* not float, ndarray, ndarray"):
             mapper.feed(1.0, f.color, f.depth)
-        with self.assertRaisesRegex(plumbline.InputError, "odometry: the matrix is no rigid motion"):
+        with self.assertRaisesRegex(plumbline.InputError, "odometry: the matrix is not a rigid motion"):
             mapper.feed(f.color, f.depth, 1.0, odometry=np.ones((4, 4)))
         mapper.feed(f.color, f.depth, 1.0)
         with self.assertRaisesRegex(plumbline.InputError, "stamp 1 s is not after"):

@@ -3,6 +3,7 @@
 
 // Topics of ROS 2, received and sent without ROS: CycloneDDS under the names and types that ROS 2's
 // middleware gives them (docs/method/network.md). CycloneDDS is in the part plumbline_ros2.so.
+#include <array>
 #include <memory>
 #include <string>
 
@@ -48,6 +49,9 @@ struct PublishedFrames {
                        ///< "camera_color_optical_frame"
   std::string base;    ///< the robot's base, above the camera by /tf_static; "": /tf ends at the camera
   OdomTf odom_tf = OdomTf::kAuto;  ///< used with a base
+  bool finished_map = false;       ///< poses are in a finished map: `map` is its frame, also with a base
+  /// Heights over the base's origin, metres, lower first, between which an occupancy grid has obstacles.
+  std::array<double, 2> grid_heights = {0.1, 1.8};
 
   /// True if any name was given.
   [[nodiscard]] bool given() const;
@@ -61,12 +65,13 @@ core::Result<PublishedFrames> parse_published_frames(const std::string& text);
 /// that is too slow misses messages and delays nothing. `name`: prefix in any case, or "". Topics are
 /// /plumbline/path (the poses of the keyframes, at the end of all frames), /plumbline/points (the cloud of
 /// each keyframe) and /plumbline/map (the merged cloud, at the end), of a robot or of each of several
-/// /NAME/..., and /tf: map -> odom -> camera, with NAME/ in front. In the frame map x points forward, y left,
-/// z up as the camera stood in its first frame; with a base, as that stood. map -> odom is sent with each
-/// frame, lost ones too. `frames`: their names as they are, for a single robot. With a base this waits some
-/// seconds for /tf_static. The destructor waits a moment for listeners to get the last messages. Error
-/// (kUsage): the network cannot be used, the address names topics, or no transform leads from the base to the
-/// camera.
+/// /NAME/..., and /tf: map -> odom -> camera, with NAME/ in front; with a base /plumbline/grid and
+/// grid_updates (occupancy as far as keyframes saw it), in a finished map /plumbline/pose (with covariance).
+/// In the frame map x points forward, y left, z up as the camera stood in its first frame; with a base, as
+/// that stood. map -> odom is sent with each frame, lost ones too. `frames`: their names as they are, for a
+/// single robot. With a base this waits some seconds for /tf_static. The destructor waits a moment for
+/// listeners to get the last messages. Error (kUsage): the network cannot be used, the address names topics,
+/// or no transform leads from the base to the camera.
 core::Result<std::shared_ptr<pipeline::RunObserver>> open_ros2_publisher(const std::string& address,
                                                                          PublishedNames names,
                                                                          const std::string& name,

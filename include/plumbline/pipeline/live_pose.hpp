@@ -18,7 +18,9 @@ struct LivePose {
   /// In the frame of the first camera, metres; later optimisation moves it, and the results are set upright.
   /// None: not tracked.
   std::optional<geometry::Rigid3> world_from_camera;
-  core::KeyframeId keyframe;  ///< valid when the frame became a keyframe
+  core::KeyframeId keyframe;        ///< valid when the frame became a keyframe
+  double sigma_position_m = 0.0;    ///< of each axis, in a finished map; 0: not known
+  double sigma_rotation_rad = 0.0;  ///< about each axis, likewise
 };
 
 }  // namespace plumbline::pipeline

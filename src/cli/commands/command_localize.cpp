@@ -30,6 +30,7 @@ void add_localize(CLI::App& app, Session& session) {
   const auto request = std::make_shared<pipeline::MapRequest>();
   const auto publish = std::make_shared<PublishRequest>();
   request->pipeline = "localize";
+  publish->finished_map = true;
   CLI::App* command =
       add_command(app, session, "localize", "Locate a camera in a finished map, which stays as it is",
                   [&session, request, publish] { return localize(session, *request, *publish); });

@@ -13,7 +13,7 @@ struct BagReaders {
   static constexpr const char* kPart = "bags";
   static constexpr std::uint64_t layout() {
     return core::layout_of<BagReaders, MessageDecoder, BagEntry, BagTopic, ImageMessage, CameraInfoMessage,
-                           TransformMessage, PathMessage, CloudMessage>();
+                           TransformMessage, PathMessage, CloudMessage, GridMessage, PoseMessage>();
   }
 
   /// Opens a bag of any format, which is recognised by its content.

@@ -89,6 +89,26 @@ struct CloudMessage {
   Bytes data;  ///< 16 bytes a point
 };
 
+/// nav_msgs/OccupancyGrid, or, without an origin and a resolution, map_msgs/OccupancyGridUpdate of a part
+struct GridMessage {
+  MessageHeader header;
+  double resolution_m = 0.0;
+  Eigen::Vector2d origin = Eigen::Vector2d::Zero();  ///< lower left corner
+  std::int32_t x = 0;                                ///< first column of the part
+  std::int32_t y = 0;                                ///< its first row
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  Bytes data;  ///< by row: 0 free, 100 occupied, 255 (-1) unknown
+};
+
+/// geometry_msgs/PoseWithCovarianceStamped
+struct PoseMessage {
+  MessageHeader header;
+  geometry::Rigid3 pose;
+  double sigma_position_m = 0.0;    ///< of each axis
+  double sigma_rotation_rad = 0.0;  ///< about each axis
+};
+
 /// A message, or what is wrong with its bytes.
 template <typename Message>
 using DecodedMessage = tl::expected<Message, std::string>;
@@ -116,6 +136,9 @@ struct MessageEncoder {
   Bytes (*transforms)(const std::vector<TransformMessage>& transforms, std::int64_t stamp_ns);
   Bytes (*path)(const PathMessage& message);
   Bytes (*cloud)(const CloudMessage& message);
+  Bytes (*grid)(const GridMessage& message);
+  Bytes (*grid_update)(const GridMessage& message);
+  Bytes (*pose)(const PoseMessage& message);
 };
 
 }  // namespace plumbline::dataset

@@ -20,6 +20,17 @@ MessageBytes encoded(const Encode& encode) {
   return encode((*part)->encoder());
 }
 
+GridMessage message_of(const std::string& frame, double stamp, GridCells cells) {
+  return {{stamp_ns_of(stamp), frame},
+          cells.resolution_m,
+          cells.origin,
+          cells.x,
+          cells.y,
+          cells.width,
+          cells.height,
+          std::move(cells.cells)};
+}
+
 }  // namespace
 
 MessageBytes transforms_message(const std::vector<NamedTransform>& transforms, double stamp) {
@@ -56,6 +67,23 @@ MessageBytes points_message(const std::string& frame, double stamp, std::vector<
   CloudMessage message{{stamp_ns_of(stamp), frame}, 0, std::move(points)};
   message.points = static_cast<std::uint32_t>(message.data.size() / kBytesOfPoint);
   return encoded([&](const MessageEncoder& encoder) { return encoder.cloud(message); });
+}
+
+MessageBytes grid_message(const std::string& frame, double stamp, GridCells grid) {
+  const GridMessage message = message_of(frame, stamp, std::move(grid));
+  return encoded([&](const MessageEncoder& encoder) { return encoder.grid(message); });
+}
+
+MessageBytes grid_update_message(const std::string& frame, double stamp, GridCells part) {
+  const GridMessage message = message_of(frame, stamp, std::move(part));
+  return encoded([&](const MessageEncoder& encoder) { return encoder.grid_update(message); });
+}
+
+MessageBytes pose_message(const std::string& frame, double stamp, const geometry::Rigid3& pose,
+                          double sigma_position_m, double sigma_rotation_rad) {
+  return encoded([&](const MessageEncoder& encoder) {
+    return encoder.pose({{stamp_ns_of(stamp), frame}, pose, sigma_position_m, sigma_rotation_rad});
+  });
 }
 
 }  // namespace plumbline::dataset

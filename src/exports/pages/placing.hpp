@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Where a second map lies in the frame of a first one.
+// The pose of a second map in the frame of a first one.
 #include <optional>
 #include <string>
 #include <vector>

@@ -308,7 +308,7 @@ core::Result<ExportSummary> write_view(MapSource& source, const std::filesystem:
   std::error_code ec;
   if (std::filesystem::is_regular_file(output, ec) && !is_view(output)) {
     return core::usage_error(fmt::format(
-        "{}: exists and is no page of a map; name another file (only such pages are ever replaced)",
+        "{}: exists and is not a page of a map; name another file (only such pages are ever replaced)",
         output.string()));
   }
 

@@ -50,7 +50,7 @@ std::string take(const std::string& setting, Ros2Address& into) {
                        : name == "depth_info" ? &into.topics.depth_info
                                               : nullptr;
 
-  if (topic == nullptr) return fmt::format("'{}' is no setting of an address", name);
+  if (topic == nullptr) return fmt::format("'{}' is not a setting of an address", name);
   *topic = value.front() == '/' ? value : "/" + value;
   return "";
 }
@@ -60,7 +60,7 @@ std::string take(const std::string& setting, Ros2Address& into) {
 core::Result<Ros2Address> parse_ros2_address(const std::string& address) {
   const std::string scheme = kScheme;
   if (address.compare(0, scheme.size(), scheme) != 0)
-    return tl::unexpected(wrong(address, "is no address of ROS 2"));
+    return tl::unexpected(wrong(address, "is not an address of ROS 2"));
 
   const std::size_t question = address.find('?');
   const std::string domain = address.substr(
@@ -72,7 +72,7 @@ core::Result<Ros2Address> parse_ros2_address(const std::string& address) {
   if (domain.empty() || error != std::errc() || stop != end) {
     return tl::unexpected(wrong(
         address,
-        fmt::format("'{}' is no domain (a number, ROS_DOMAIN_ID of the camera; 0 by default)", domain)));
+        fmt::format("'{}' is not a domain (a number, ROS_DOMAIN_ID of the camera; 0 by default)", domain)));
   }
 
   if (question != std::string::npos) {

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "plumbline/net/ros2.hpp"
+#include "ros2/live_grid.hpp"
 #include "ros2/outgoing.hpp"
 #include "ros2/transform_listener.hpp"
 
@@ -26,6 +27,9 @@ using geometry::Rigid3;
 constexpr const char* kPath = "nav_msgs/Path";
 constexpr const char* kPoints = "sensor_msgs/PointCloud2";
 constexpr const char* kTransforms = "tf2_msgs/TFMessage";
+constexpr const char* kGrid = "nav_msgs/OccupancyGrid";
+constexpr const char* kGridUpdate = "map_msgs/OccupancyGridUpdate";
+constexpr const char* kPose = "geometry_msgs/PoseWithCovarianceStamped";
 
 /// A camera looks along z and has x to its right; ROS' bodies look along x and have z above them.
 Rigid3 body_from_optical() {
@@ -67,6 +71,18 @@ std::vector<std::uint8_t> packed(const cloud::Cloud& cloud, const Rigid3& frame_
   return bytes;
 }
 
+/// A part of a cloud's points, enough for a grid: at most about 40 000.
+std::vector<Eigen::Vector3f> thinned(const cloud::Cloud& cloud, const Rigid3& frame_from_cloud) {
+  constexpr std::size_t kMost = 40'000;
+  const Eigen::Matrix3f rotation = frame_from_cloud.rotation.cast<float>();
+  const Eigen::Vector3f translation = frame_from_cloud.translation.cast<float>();
+  std::vector<Eigen::Vector3f> points;
+  const std::size_t step = 1 + cloud.size() / kMost;
+  for (std::size_t i = 0; i < cloud.size(); i += step)
+    points.emplace_back(rotation * cloud[i].getVector3fMap() + translation);
+  return points;
+}
+
 class Ros2Publisher final : public pipeline::RunObserver {
  public:
   /// `others` and `base_from_camera`: with a base.
@@ -78,6 +94,7 @@ class Ros2Publisher final : public pipeline::RunObserver {
         frames_(std::move(frames)),
         log_(log),
         body_(base_from_camera),
+        published_from_map_(frames_.finished_map ? body_from_optical() : base_from_camera),
         others_(std::move(others)),
         outgoing_(std::move(sink), log) {}
 
@@ -88,13 +105,15 @@ class Ros2Publisher final : public pipeline::RunObserver {
   }
 
   void placed(std::int32_t robot, double stamp, const Rigid3& shared_from_map) override {
-    post_transforms({{"map", frame(robot, frames_.map), body_ * shared_from_map * body_.inverse()}}, stamp);
+    post_transforms({{"map", frame(robot, frames_.map),
+                      published_from_map_ * shared_from_map * published_from_map_.inverse()}},
+                    stamp);
   }
 
   void tracked(std::int32_t robot, double stamp, const Rigid3& map_from_camera,
                const Rigid3& odometry_from_camera) override {
-    const Rigid3 map_from_body = body_ * map_from_camera * body_of_camera().inverse();
-    Rigid3 odometry_from_body = body_ * odometry_from_camera * body_of_camera().inverse();
+    const Rigid3 map_from_body = published_from_map_ * map_from_camera * body_of_camera().inverse();
+    Rigid3 odometry_from_body = published_from_map_ * odometry_from_camera * body_of_camera().inverse();
     const bool other = another_publishes();
     if (other) {
       const auto theirs = others_->base_at(stamp);
@@ -110,13 +129,16 @@ class Ros2Publisher final : public pipeline::RunObserver {
     if (others_ != nullptr && !other) others_->sends(stamp);
     post_transforms(std::move(transforms), stamp);
 
-    const std::lock_guard lock(mutex_);
-    corrections_[robot] = map_from_odometry;
+    note_correction(robot, map_from_odometry);
   }
 
-  /// A frame without a pose: the correction stays as it was.
+  /// A frame without a pose: the correction stays as it was. One that was located tells how well.
   void processed(const pipeline::LivePose& pose) override {
-    if (pose.world_from_camera || robots_.size() != 1) return;
+    if (robots_.size() != 1) return;
+    if (pose.world_from_camera) {
+      if (pose.sigma_position_m > 0.0) post_pose(pose);
+      return;
+    }
     const std::lock_guard lock(mutex_);
     const auto known = corrections_.find(0);
     if (known == corrections_.end()) return;
@@ -124,14 +146,29 @@ class Ros2Publisher final : public pipeline::RunObserver {
   }
 
   void keyframes(std::int32_t robot, const geometry::Trajectory& path) override {
-    post_path(robot, path, body_, false);
+    post_path(robot, path, published_from_map_, false);
+    if (frames_.base.empty()) return;
+
+    const std::lock_guard lock(mutex_);
+    LiveGrid& grid = grid_of(robot);
+    grid.move(moved(path, published_from_map_));
+    post_grid(robot, path.empty() ? 0.0 : path.back().stamp, grid);
   }
 
   void added(std::int32_t robot, double stamp, const Rigid3& map_from_cloud,
              const cloud::Cloud& cloud) override {
     // The cloud goes on to others: what is sent is made of it now.
     post_points(topic(robot, "points"), frame(robot, frames_.map), stamp,
-                packed(cloud, body_ * map_from_cloud), false);
+                packed(cloud, published_from_map_ * map_from_cloud), false);
+    if (frames_.base.empty()) return;
+
+    // Without a base nobody knows where the floor is.
+    const Rigid3 published_from_cloud = published_from_map_ * map_from_cloud;
+    const std::vector<Eigen::Vector3f> points = thinned(cloud, published_from_cloud);
+    const std::lock_guard lock(mutex_);
+    LiveGrid& grid = grid_of(robot);
+    grid.add(stamp, published_from_cloud, points);
+    post_grid(robot, stamp, grid);
   }
 
   void finished(const std::vector<geometry::Trajectory>& paths, const Rigid3& map_from_cloud,
@@ -140,9 +177,10 @@ class Ros2Publisher final : public pipeline::RunObserver {
     for (std::size_t r = 0; r < paths.size(); ++r) {
       if (paths[r].empty()) continue;
       stamp = std::max(stamp, paths[r].back().stamp);
-      post_path(static_cast<std::int32_t>(r), paths[r], body_, true);
+      post_path(static_cast<std::int32_t>(r), paths[r], published_from_map_, true);
     }
-    post_points(shared_topic("map"), shared_frame(), stamp, packed(cloud, body_ * map_from_cloud), true);
+    post_points(shared_topic("map"), shared_frame(), stamp,
+                packed(cloud, published_from_map_ * map_from_cloud), true);
   }
 
  private:
@@ -192,6 +230,60 @@ class Ros2Publisher final : public pipeline::RunObserver {
     return !several(robots_.size()) ? frame(0, frames_.map) : "map";
   }
 
+  /// Keeps a robot's correction, and tells of a jump.
+  void note_correction(std::int32_t robot, const Rigid3& map_from_odometry) {
+    constexpr double kJump_m = 0.05;
+    constexpr double kJump_rad = 0.035;
+    const std::lock_guard lock(mutex_);
+    const auto known = corrections_.find(robot);
+    if (known == corrections_.end()) {
+      corrections_.emplace(robot, map_from_odometry);
+      return;
+    }
+
+    const Rigid3 jump = known->second.inverse() * map_from_odometry;
+    const double turn_rad = Eigen::AngleAxisd(jump.rotation).angle();
+    if (jump.translation.norm() > kJump_m || turn_rad > kJump_rad) {
+      log_.info(fmt::format("/tf: {} -> {} was corrected by {:.2f} m and {:.1f} degrees",
+                            frame(robot, frames_.map), frame(robot, frames_.odom), jump.translation.norm(),
+                            turn_rad * 180.0 / M_PI));
+    }
+    known->second = map_from_odometry;
+  }
+
+  /// With mutex_ held.
+  LiveGrid& grid_of(std::int32_t robot) {
+    LiveGrid::Options options;
+    options.low_m = frames_.grid_heights[0];
+    options.high_m = frames_.grid_heights[1];
+    return grids_.try_emplace(robot, options).first->second;
+  }
+
+  /// A whole grid, then parts that differ from it, so that who subscribes late gets both.
+  void post_grid(std::int32_t robot, double stamp, LiveGrid& grid) {
+    auto change = grid.take();
+    if (!change) return;
+    const auto cells = std::make_shared<dataset::GridCells>(std::move(change->cells));
+    const std::string in = frame(robot, frames_.map);
+    if (change->whole) {
+      outgoing_.post({topic(robot, "grid"), kGrid,
+                      [in, stamp, cells] { return dataset::grid_message(in, stamp, std::move(*cells)); },
+                      true});
+    } else {
+      outgoing_.post({topic(robot, "grid_updates"), kGridUpdate, [in, stamp, cells] {
+                        return dataset::grid_update_message(in, stamp, std::move(*cells));
+                      }});
+    }
+  }
+
+  void post_pose(const pipeline::LivePose& pose) {
+    const Rigid3 map_from_body = published_from_map_ * *pose.world_from_camera * body_of_camera().inverse();
+    outgoing_.post({topic(0, "pose"), kPose, [in = frame(0, frames_.map), map_from_body, pose] {
+                      return dataset::pose_message(in, pose.stamp, map_from_body, pose.sigma_position_m,
+                                                   pose.sigma_rotation_rad);
+                    }});
+  }
+
   void post_transforms(std::vector<dataset::NamedTransform> transforms, double stamp) {
     outgoing_.post({"/tf", kTransforms, [transforms = std::move(transforms), stamp] {
                       return dataset::transforms_message(transforms, stamp);
@@ -218,12 +310,14 @@ class Ros2Publisher final : public pipeline::RunObserver {
   const std::string name_;
   const PublishedFrames frames_;
   core::Log& log_;
-  const Rigid3 body_;  ///< body_from_camera: of the base if there is one, else x ahead and z up
+  const Rigid3 body_;                ///< body_from_camera: of the base if there is one, else x ahead and z up
+  const Rigid3 published_from_map_;  ///< from the observer's maps, whose y points down
   const std::unique_ptr<TransformListener> others_;  ///< null: without a base
   bool told_other_ = false;
   std::vector<std::string> robots_;  ///< prefix of names, by number; "": none
   std::mutex mutex_;
   std::map<std::int32_t, Rigid3> corrections_;  ///< map_from_odometry, by robot
+  std::map<std::int32_t, LiveGrid> grids_;      ///< by robot; with a base
   Outgoing outgoing_;
 };
 

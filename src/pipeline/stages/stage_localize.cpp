@@ -103,7 +103,7 @@ class LocalizeStage : public Stage {
       longest_gap_ = std::max(longest_gap_, ++gap_);
       last_reason_ = located.reason;
       rows_.push_back({located.number, "lost", text + ",,,,,,,,," + core::csv_field(located.reason)});
-      show({located.number, located.stamp, "lost", std::nullopt, {}});
+      show({located.number, located.stamp, "lost", std::nullopt, {}, 0.0, 0.0});
       return;
     }
 
@@ -116,7 +116,13 @@ class LocalizeStage : public Stage {
                                  located.sigma_position_m, located.sigma_rotation_rad,
                                  core::csv_field(name_of(located.keyframe.robot)), located.keyframe.index,
                                  located.points, located.lines, located.found, located.surface_share)});
-    show({located.number, located.stamp, "tracked", located.map_from_camera, {}});
+    show({located.number,
+          located.stamp,
+          "tracked",
+          located.map_from_camera,
+          {},
+          located.sigma_position_m,
+          located.sigma_rotation_rad});
   }
 
   /// Observers expect maps in the frame of a camera, whose y points down.

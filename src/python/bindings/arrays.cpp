@@ -99,7 +99,7 @@ geometry::Rigid3 pose_of(const py::array& given, const std::string& what) {
       (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kSlack;
   if (!is_rotation || rotation.determinant() < 0.0 || !pose.translation.allFinite())
     throw Failure(
-        {core::ErrorKind::kInput, what + ": the matrix is no rigid motion (rotation and translation)"});
+        {core::ErrorKind::kInput, what + ": the matrix is not a rigid motion (rotation and translation)"});
   return {Eigen::Quaterniond(rotation), pose.translation};
 }
 

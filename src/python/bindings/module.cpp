@@ -36,7 +36,7 @@ void add_errors(py::module_& module) {
 
 PYBIND11_MODULE(_core, module) {
   using namespace plumbline;
-  module.doc() = "What plumbline's Python classes are made of; use those.";
+  module.doc() = "Parts of plumbline's Python classes; use those classes.";
   pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // the step that called PCL reports failures
 
   module.attr("version") = core::version();

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Poses on ROS 2's network in a robot's own frames, beside a publisher of its URDF and one of its odometry.
 #include <gtest/gtest.h>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <map>
@@ -54,10 +57,12 @@ class Transforms : public testing::Test {
     send("/tf_static",
          {{"base_link", "camera_link", link}, {"camera_link", "camera_color_optical_frame", optical}}, 0.0);
   }
-  core::Result<std::shared_ptr<pipeline::RunObserver>> open(const std::string& frames, OdomTf odom_tf) {
+  core::Result<std::shared_ptr<pipeline::RunObserver>> open(const std::string& frames, OdomTf odom_tf,
+                                                            bool finished_map = false) {
     auto parsed = parse_published_frames(frames);
     EXPECT_TRUE(parsed) << parsed.error().message;
     parsed->odom_tf = odom_tf;
+    parsed->finished_map = finished_map;
     auto observer = open_ros2_publisher(address(), PublishedNames::kOfOne, "", *parsed, *log_);
     if (observer) (*observer)->begins({"robot"});
     return observer;
@@ -83,6 +88,18 @@ class Transforms : public testing::Test {
       for (const auto& [stamp, t] : *transforms) edges[t.parent + " -> " + t.child] = t.parent_from_child;
     }
     return edges;
+  }
+
+  /// Bytes of the latest message of a topic; empty: none within two seconds.
+  std::vector<std::uint8_t> received(const std::string& topic) {
+    const auto end = std::chrono::steady_clock::now() + 2s;
+    bool subscribed = false;
+    while (std::chrono::steady_clock::now() < end) {
+      if (!subscribed) subscribed = static_cast<bool>(heard_->subscribe(topic));
+      auto message = heard_->next(50ms);
+      if (message && message->topic == topic) return std::move(message->bytes);
+    }
+    return {};
   }
 
   std::shared_ptr<core::Log> log_ = core::null_log();
@@ -164,6 +181,52 @@ TEST_F(Transforms, LostFramesKeepTheCorrection) {
   const auto edges = listen(800ms);
   ASSERT_EQ(edges.size(), 1U);
   EXPECT_NEAR(edges.at("map -> wheels").translation.norm(), 0.2, 1e-9);
+}
+
+TEST_F(Transforms, InAFinishedMapItsFrameStaysWhereTheMapHasIt) {
+  send_mount();
+  const auto observer = open("base=base_link", OdomTf::kOwn, true);
+  ASSERT_TRUE(observer) << observer.error().message;
+  listen(500ms);
+
+  // The base stands in the map's origin and looks along x: observers see the map turned to a camera's axes.
+  Rigid3 optical_from_map;
+  optical_from_map.rotation = mount().rotation.transpose();
+  pipeline::LivePose pose;
+  pose.stamp = 100.0;
+  pose.world_from_camera = optical_from_map * mount();
+  pose.sigma_position_m = 0.02;
+  pose.sigma_rotation_rad = 0.01;
+  (*observer)->processed(pose);
+  (*observer)->tracked(0, pose.stamp, *pose.world_from_camera, *pose.world_from_camera);
+
+  const auto edges = listen(1500ms);
+  EXPECT_LT(edges.at("odom -> base_link").translation.norm(), 1e-9);
+  EXPECT_LT(edges.at("map -> odom").translation.norm(), 1e-9);
+  const auto bytes = received("/plumbline/pose");
+  ASSERT_FALSE(bytes.empty());
+  EXPECT_NE(std::string(bytes.begin(), bytes.end()).find("map"), std::string::npos);
+}
+
+TEST_F(Transforms, ABaseGetsAGridOfWhatKeyframesSaw) {
+  send_mount();
+  const auto observer = open("base=base_link", OdomTf::kOwn);
+  ASSERT_TRUE(observer) << observer.error().message;
+  listen(500ms);
+
+  // A wall 2 m ahead, from the floor to 1 m over it, in the camera's axes.
+  cloud::Cloud wall;
+  for (float x = -0.5F; x < 0.5F; x += 0.01F) {
+    for (float y = -0.5F; y < 0.5F; y += 0.01F) {
+      cloud::Point point;
+      point.getVector3fMap() = Eigen::Vector3f(x, y, 2.0F);
+      wall.push_back(point);
+    }
+  }
+  (*observer)->added(0, 100.0, Rigid3(), wall);
+  const auto bytes = received("/plumbline/grid");
+  ASSERT_GT(bytes.size(), 128U * 128U);
+  EXPECT_NE(std::count(bytes.begin() + 100, bytes.end(), 100), 0) << "no cell is occupied";
 }
 
 TEST_F(Transforms, WithoutAMountItSaysWhatToStart) {

@@ -117,7 +117,7 @@ def live(case):
 def messages(case):
     text = case.run("map", case.address(), "-o", case.work / "none", code=3)
     check("nothing at all is published" in text and "ROS_DOMAIN_ID" in text, text)
-    for address, word in (("ros2://x", "is no domain"), ("ros2://7?colour=/a", "'colour' is no setting"),
+    for address, word in (("ros2://x", "is not a domain"), ("ros2://7?colour=/a", "'colour' is not a setting"),
                           ("ros2://300", "--domain"), ("ros2://7?interface=none0", "no interface")):
         check(word in case.run("map", address, "-o", case.work / "none", code=2), address)
     check("is live" in case.run("map", case.address(), "-o", case.work / "none", "--from", 1, code=2), "--from")

@@ -19,13 +19,11 @@ TEST(Ros2Address, SettingsAreTaken) {
 }
 
 TEST(Ros2Address, WhatIsWrongIsNamed) {
-  const std::pair<const char*, const char*> wrong[] = {{"ros2://", "is no domain"},
-                                                       {"ros2://1a", "'1a' is no domain"},
-                                                       {"ros2://-1?interface=lo", "--domain"},
-                                                       {"ros2://1?colour=/a", "'colour' is no setting"},
-                                                       {"ros2://1?color", "is not NAME=VALUE"},
-                                                       {"ros2://1?interface=no such", "no interface"},
-                                                       {"http://1", "is no address"}};
+  const std::pair<const char*, const char*> wrong[] = {
+      {"ros2://", "is not a domain"},          {"ros2://1a", "'1a' is not a domain"},
+      {"ros2://-1?interface=lo", "--domain"},  {"ros2://1?colour=/a", "'colour' is not a setting"},
+      {"ros2://1?color", "is not NAME=VALUE"}, {"ros2://1?interface=no such", "no interface"},
+      {"http://1", "is not an address"}};
   for (const auto& [text, word] : wrong) {
     const auto address = parse_ros2_address(text);
     ASSERT_FALSE(address) << text;

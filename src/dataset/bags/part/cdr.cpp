@@ -359,9 +359,50 @@ Bytes encode_cdr(const CloudMessage& message) {
   return write_sample(&cloud, sensor_msgs_msg_dds__PointCloud2__desc);
 }
 
+Bytes encode_grid(const GridMessage& message) {
+  nav_msgs_msg_dds__OccupancyGrid_ grid{};
+  grid.header = header_from(message.header.stamp_ns, message.header.frame_id);
+  grid.info.map_load_time = grid.header.stamp;
+  grid.info.resolution = static_cast<float>(message.resolution_m);
+  grid.info.width = message.width;
+  grid.info.height = message.height;
+  grid.info.origin.position = {message.origin.x(), message.origin.y(), 0.0};
+  grid.info.origin.orientation = {0.0, 0.0, 0.0, 1.0};
+  grid.data = borrowed(message.data);
+  return write_sample(&grid, nav_msgs_msg_dds__OccupancyGrid__desc);
+}
+
+Bytes encode_grid_update(const GridMessage& message) {
+  map_msgs_msg_dds__OccupancyGridUpdate_ update{};
+  update.header = header_from(message.header.stamp_ns, message.header.frame_id);
+  update.x = message.x;
+  update.y = message.y;
+  update.width = message.width;
+  update.height = message.height;
+  update.data = borrowed(message.data);
+  return write_sample(&update, map_msgs_msg_dds__OccupancyGridUpdate__desc);
+}
+
+Bytes encode_cdr(const PoseMessage& message) {
+  geometry_msgs_msg_dds__PoseWithCovarianceStamped_ sample{};
+  sample.header = header_from(message.header.stamp_ns, message.header.frame_id);
+  const Eigen::Quaterniond q = message.pose.quaternion();
+  const Eigen::Vector3d& t = message.pose.translation;
+  sample.pose.pose.position = {t.x(), t.y(), t.z()};
+  sample.pose.pose.orientation = {q.x(), q.y(), q.z(), q.w()};
+
+  // Row by row: x, y, z, then turns about them.
+  for (std::size_t i = 0; i < 6; ++i) {
+    const double sigma = i < 3 ? message.sigma_position_m : message.sigma_rotation_rad;
+    sample.pose.covariance[i * 7] = sigma * sigma;
+  }
+  return write_sample(&sample, geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc);
+}
+
 const MessageEncoder& cdr_encoder() {
-  static const MessageEncoder encoder{&encode_cdr, &encode_cdr, &encode_cdr,
-                                      &encode_cdr, &encode_cdr, &encode_cdr};
+  static const MessageEncoder encoder{&encode_cdr,  &encode_cdr,         &encode_cdr,
+                                      &encode_cdr,  &encode_cdr,         &encode_cdr,
+                                      &encode_grid, &encode_grid_update, &encode_cdr};
   return encoder;
 }
 

@@ -18,6 +18,11 @@ Bytes encode_cdr(const CameraInfoMessage& message);
 Bytes encode_cdr(const std::vector<TransformMessage>& transforms, std::int64_t stamp_ns);
 Bytes encode_cdr(const PathMessage& message);
 Bytes encode_cdr(const CloudMessage& message);
+/// nav_msgs/OccupancyGrid
+Bytes encode_grid(const GridMessage& message);
+/// map_msgs/OccupancyGridUpdate
+Bytes encode_grid_update(const GridMessage& message);
+Bytes encode_cdr(const PoseMessage& message);
 const MessageEncoder& cdr_encoder();
 
 }  // namespace plumbline::dataset

@@ -11,7 +11,7 @@
 namespace plumbline::net {
 namespace {
 
-const std::array<KnownType, 8> kTypes = {{
+const std::array<KnownType, 11> kTypes = {{
     {"sensor_msgs/Image", &sensor_msgs_msg_dds__Image__desc,
      "d31d41a9a4c4bc8eae9be757b0beed306564f7526c88ea6a4588fb9582527d47"},
     {"sensor_msgs/CompressedImage", &sensor_msgs_msg_dds__CompressedImage__desc, ""},
@@ -22,6 +22,9 @@ const std::array<KnownType, 8> kTypes = {{
     {"sensor_msgs/Imu", &sensor_msgs_msg_dds__Imu__desc, ""},
     {"nav_msgs/Odometry", &nav_msgs_msg_dds__Odometry__desc, ""},
     {"nav_msgs/Path", &nav_msgs_msg_dds__Path__desc, ""},
+    {"nav_msgs/OccupancyGrid", &nav_msgs_msg_dds__OccupancyGrid__desc, ""},
+    {"map_msgs/OccupancyGridUpdate", &map_msgs_msg_dds__OccupancyGridUpdate__desc, ""},
+    {"geometry_msgs/PoseWithCovarianceStamped", &geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc, ""},
 }};
 
 /// Configuration of the domain as XML. The environment is not read.
@@ -49,7 +52,7 @@ std::string configuration(const NetworkOptions& options) {
   // Participants that start later are found at once.
   xml += "<SPDPInterval>1 s</SPDPInterval></Discovery>";
 
-  // As much of a receive buffer as the system gives; no memory for samples larger than any cloud.
+  // The largest receive buffer that the system gives; no memory for samples larger than any cloud.
   xml += "<Internal><SocketReceiveBufferSize max=\"8 MB\"/><MaxSampleSize>512 MB</MaxSampleSize></Internal>";
   return xml + "</Domain></CycloneDDS>";
 }
