@@ -159,6 +159,7 @@ Fit best_place(const Samples& thing, const Ground& ground, const std::vector<Eig
   constexpr double kStep_m = 0.1;
   constexpr int kSteps = 6;  // each way
   constexpr std::size_t kSettled = 12;
+
   // Starts at each target, in all directions
   std::vector<Fit> fits;
   for (const Eigen::Vector3d& target : targets) {

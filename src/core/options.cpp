@@ -66,6 +66,7 @@ OptionTable& OptionTable::add(OptionSpec spec, Binding binding) {
   for (const OptionSpec& other : specs_) {
     if (other.key == spec.key) throw std::logic_error("option declared twice: " + spec.key);
   }
+
   // The value at declaration is the default
   spec.default_value = binding.print();
   specs_.push_back(std::move(spec));
@@ -89,6 +90,7 @@ OptionTable& OptionTable::integer(std::string key, int& value, Range<int> range,
   const auto parse = [&value, range, unit](const ConfigNode& node) -> std::string {
     const ParsedNumber parsed = parse_in_range(node, range.min, range.max, unit);
     if (!parsed.wrong.empty()) return parsed.wrong;
+
     // Numbers such as 3.0 are accepted, 3.5 is not
     if (parsed.value != std::floor(parsed.value)) {
       return fmt::format("{} is not a whole number (allowed: {})", node.scalar,

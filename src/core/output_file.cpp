@@ -79,6 +79,7 @@ OutputFile::~OutputFile() { discard(); }
 void OutputFile::write(const void* bytes, std::size_t count) {
   if (!problem_.empty()) return;
   const char* from = static_cast<const char*>(bytes);
+
   // Small writes are collected; the system is called for full buffers only
   while (count > 0) {
     const std::size_t part = std::min(count, kBuffer - buffer_.size());
@@ -91,6 +92,7 @@ void OutputFile::write(const void* bytes, std::size_t count) {
 
 void OutputFile::flush() {
   std::size_t done = 0;
+
   // A signal may interrupt a write; it is then repeated
   while (done < buffer_.size() && problem_.empty()) {
     const ssize_t n = ::write(descriptor_, buffer_.data() + done, buffer_.size() - done);

@@ -60,6 +60,7 @@ std::size_t PackedBlocks::add(const Bytes& block) {
 
 std::optional<Bytes> PackedBlocks::get(std::size_t number) const {
   const Place& place = places_.at(number);
+
   // The disk had no room for this block
   if (!place.packed.empty()) return unpack(place.packed.data(), place.size);
 

@@ -19,6 +19,7 @@ std::string ending_of(const std::filesystem::path& file) { return lower(file.ext
 Character first_character(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned char first = byte(0);
+
   // One byte of ASCII
   if (first < 0x80) return {first, 1};
   const std::size_t bytes = first >= 0xf0 ? 4 : first >= 0xe0 ? 3 : 2;

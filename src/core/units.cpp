@@ -138,6 +138,7 @@ std::string describe(const ConfigNode& node) {
     case ConfigNode::Kind::kScalar:
       break;
   }
+
   // Long texts are cut to stay readable
   constexpr std::size_t kShown = 40;
   const bool longer = node.scalar.size() > kShown;

@@ -152,6 +152,7 @@ class TreeBuilder : public YAML::EventHandler {
   void start(ConfigNode::Kind kind, const YAML::Mark& at, const std::string& tag, YAML::anchor_t anchor) {
     count(1, mark(at));
     check_tag(at, tag);
+
     // A limit on depth protects the recursion
     if (open_.size() >= kMaxDepth) too_deep(mark(at));
     if (!open_.empty() && open_.back().node.kind == ConfigNode::Kind::kMap && !open_.back().has_key) {
@@ -168,6 +169,7 @@ class TreeBuilder : public YAML::EventHandler {
   void end() {
     Open done = std::move(open_.back());
     open_.pop_back();
+
     // Aliases may copy this node later
     if (done.anchor != 0) {
       const std::size_t nodes = count_nodes(done.node);
@@ -182,6 +184,7 @@ class TreeBuilder : public YAML::EventHandler {
       return;
     }
     Open& parent = open_.back();
+
     // A map takes a key and a value in turn
     if (parent.node.kind == ConfigNode::Kind::kSequence) {
       parent.node.items.push_back(std::move(node));

@@ -47,6 +47,7 @@ std::array<T, 3> y_up(T x, T y, T z) {
   return {x, z, -y};
 }
 
+/// Points with colours as linear light.
 core::Result<GlbData> points_as_glb(MapSource& source) {
   const auto cloud = source.cloud();
   if (!cloud) return tl::unexpected(cloud.error());
@@ -60,16 +61,19 @@ core::Result<GlbData> points_as_glb(MapSource& source) {
   return data;
 }
 
+/// The mesh with unit normals, which glTF requires.
 core::Result<GlbData> mesh_as_glb(MapSource& source) {
   const auto mesh = mesh_of(source);
   if (!mesh) return tl::unexpected(mesh.error());
 
+  // Columns of the mesh
   const std::array<std::uint16_t, 256> light = linear_light();
   std::array<const std::vector<float>*, 6> columns{};
   const std::array<const char*, 6> names{"x", "y", "z", "nx", "ny", "nz"};
   for (std::size_t k = 0; k < 6; ++k) columns[k] = mesh->floats(names[k]);
   const auto *red = mesh->bytes("red"), *green = mesh->bytes("green"), *blue = mesh->bytes("blue");
 
+  // Vertices in glTF's axes
   GlbData data;
   for (std::size_t v = 0; v < mesh->vertex_count; ++v) {
     const auto at = [&](std::size_t k) { return (*columns[k])[v]; };
@@ -80,6 +84,7 @@ core::Result<GlbData> mesh_as_glb(MapSource& source) {
     data.colors.push_back({light[(*red)[v]], light[(*green)[v]], light[(*blue)[v]], 65535});
   }
 
+  // Positions are floats, so the shift stays apart
   data.triangles = mesh->triangles;
   data.shift = y_up(mesh->shift[0], mesh->shift[1], mesh->shift[2]);
   return data;
@@ -97,6 +102,7 @@ Json glb_json(const GlbData& data, const std::string& name, const std::string& f
   low.fill(std::numeric_limits<float>::max());
   high.fill(std::numeric_limits<float>::lowest());
 
+  // glTF requires the range of positions
   for (const auto& p : data.positions) {
     for (std::size_t k = 0; k < 3; ++k) {
       low[k] = std::min(low[k], p[k]);
@@ -104,6 +110,7 @@ Json glb_json(const GlbData& data, const std::string& name, const std::string& f
     }
   }
 
+  // One node, moved by the shift
   Json json;
   json["asset"] = {{"version", "2.0"},
                    {"generator", std::string("plumbline ") + core::version()},
@@ -113,6 +120,7 @@ Json glb_json(const GlbData& data, const std::string& name, const std::string& f
   json["nodes"] = Json::array({{{"name", name}, {"mesh", 0}}});
   if (data.shift != std::array<double, 3>{}) json["nodes"][0]["translation"] = data.shift;
 
+  // A section of the buffer and its accessor
   std::size_t offset = 0;
   const auto add = [&](std::size_t bytes, int target, Json accessor) {
     accessor["bufferView"] = json["bufferViews"].size();
@@ -123,6 +131,7 @@ Json glb_json(const GlbData& data, const std::string& name, const std::string& f
     return json["accessors"].size() - 1;
   };
 
+  // Sections in the order in which they are written
   json["bufferViews"] = Json::array();
   json["accessors"] = Json::array();
   const std::size_t count = data.positions.size();
@@ -140,6 +149,7 @@ Json glb_json(const GlbData& data, const std::string& name, const std::string& f
       add(byte_size(data.colors), kVertices,
           {{"componentType", kShort}, {"normalized", true}, {"count", count}, {"type", "VEC4"}});
 
+  // Mode 0 is points, mode 4 triangles
   Json primitive = {{"attributes", attributes}, {"material", 0}, {"mode", data.triangles.empty() ? 0 : 4}};
   if (!data.triangles.empty()) {
     primitive["indices"] =
@@ -147,6 +157,7 @@ Json glb_json(const GlbData& data, const std::string& name, const std::string& f
             {{"componentType", kInt}, {"count", 3 * data.triangles.size()}, {"type", "SCALAR"}});
   }
 
+  // Colours as recorded, without lighting
   json["meshes"] = Json::array({{{"primitives", Json::array({primitive})}}});
   json["materials"] =
       Json::array({{{"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", 1.0}}},

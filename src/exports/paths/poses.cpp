@@ -27,12 +27,14 @@ geometry::Matrix6d in_world(const geometry::Matrix6d& covariance, const geometry
   return change * covariance * change.transpose();
 }
 
+/// Writes poses of the camera or the body with their covariances.
 core::Result<ExportSummary> write_poses(MapSource& source, const std::filesystem::path& output) {
   const auto store = source.store("the covariance of poses");
   if (!store) return tl::unexpected(store.error());
   const auto body_from_camera = body_from_camera_of(source.options());
   if (!body_from_camera) return tl::unexpected(body_from_camera.error());
 
+  // Poses of the body that carries the camera
   const geometry::Rigid3 camera_from_body = body_from_camera->inverse();
   const auto poses = source.poses(source.request().content == Content::kKeyframes);
   if (!poses) return tl::unexpected(poses.error());
@@ -40,6 +42,7 @@ core::Result<ExportSummary> write_poses(MapSource& source, const std::filesystem
   const auto state = (*store)->fusion_state();
   if (!state) return tl::unexpected(state.error());
 
+  // Covariances by robot and stamp
   std::vector<std::int32_t> robots;
   std::vector<double> stamps;
   for (const ExportPose& pose : *poses) {
@@ -49,28 +52,34 @@ core::Result<ExportSummary> write_poses(MapSource& source, const std::filesystem
 
   const std::vector<geometry::Matrix6d> covariances = state->covariances_of(robots, stamps);
 
+  // Comments explain frame and axes
   core::OutputFile out(output);
   out.write(
       fmt::format("# {}\n# covariance of position (m) and of turns about the world's axes (rad), beside the "
                   "first keyframe\n",
                   source.frame_text()));
 
+  // Columns of the upper triangle
   std::string head = "robot,keyframe,stamp,x,y,z,qx,qy,qz,qw";
   for (int r = 0; r < 6; ++r) {
     for (int c = r; c < 6; ++c) head += fmt::format(",cov_{}_{}", kPosesAxes[r], kPosesAxes[c]);
   }
 
+  // One row per pose
   out.write(head + "\n");
   std::size_t unknown = 0;
   for (std::size_t i = 0; i < poses->size(); ++i) {
     const ExportPose& pose = (*poses)[i];
     const geometry::Rigid3 body = pose.world_from_camera * camera_from_body;
+
+    // Only keyframes have a number
     const Eigen::Quaterniond q = body.quaternion();
     std::string row = fmt::format(
         "{},{},{:.6f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f}", core::csv_field(pose.robot_name),
         pose.keyframe.valid() ? std::to_string(pose.keyframe.index) : "", pose.stamp, body.translation.x(),
         body.translation.y(), body.translation.z(), q.x(), q.y(), q.z(), q.w());
 
+    // Unknown covariances leave their columns empty
     if (covariances.empty() || !covariances[i].allFinite()) {
       ++unknown;
       row += std::string(21, ',');
@@ -84,6 +93,7 @@ core::Result<ExportSummary> write_poses(MapSource& source, const std::filesystem
     out.write(row + "\n");
   }
 
+  // The summary says why covariances are missing
   if (auto written = out.commit(); !written) return tl::unexpected(written.error());
   ExportSummary summary;
   summary.written = {output};

@@ -17,6 +17,7 @@ bool make_a_corner(const WallLine& a, const WallLine& b) {
 
 }  // namespace
 
+/// Joins ends of walls that meet: with an end of another wall, or with its face.
 void join_corners(std::vector<WallLine>& walls) {
   constexpr double kReach_m = 0.3;
   constexpr double kBeyond_m = 0.08;  // that a wall was seen beyond its corner, by noise
@@ -26,6 +27,7 @@ void join_corners(std::vector<WallLine>& walls) {
     wall.corner_end = {0, 0};
   }
 
+  // A possible corner, or a face that an end meets
   struct Meeting {
     double distance;
     std::size_t wall;
@@ -36,6 +38,7 @@ void join_corners(std::vector<WallLine>& walls) {
     double other_s;
   };
 
+  // Meetings of all pairs that are not parallel
   std::vector<Meeting> meetings;
   for (std::size_t i = 0; i < walls.size(); ++i) {
     for (std::size_t j = 0; j < walls.size(); ++j) {
@@ -44,10 +47,12 @@ void join_corners(std::vector<WallLine>& walls) {
       normals.row(1) = walls[j].normal.transpose();
       if (i == j || std::abs(normals.determinant()) < kLeastTurn) continue;
 
+      // The place where both lines cross
       const Eigen::Vector2d at = normals.inverse() * Eigen::Vector2d(walls[i].offset_m, walls[j].offset_m);
       const double s = walls[i].along().dot(at);
       const double t = walls[j].along().dot(at);
 
+      // Ends near the crossing
       for (int end = 0; end < 2; ++end) {
         const double more = end == 0 ? walls[i].s0 - s : s - walls[i].s1;  // that the wall is longer
         const double off = std::abs(more);
@@ -57,12 +62,15 @@ void join_corners(std::vector<WallLine>& walls) {
           if (other_more <= kReach_m && other_more >= -kBeyond_m && make_a_corner(walls[i], walls[j]))
             meetings.push_back({off + std::abs(other_more), i, end, j, other, s, t});
         }
+
+        // An end at the face of a wall is the second choice
         if (t > walls[j].s0 + kReach_m && t < walls[j].s1 - kReach_m)
           meetings.push_back({off + 2.0 * kReach_m, i, end, j, 2, s, t});
       }
     }
   }
 
+  // The nearest meetings are taken first
   std::stable_sort(meetings.begin(), meetings.end(),
                    [](const Meeting& a, const Meeting& b) { return a.distance < b.distance; });
   for (const Meeting& m : meetings) {
@@ -71,17 +79,20 @@ void join_corners(std::vector<WallLine>& walls) {
     if (wall.corner[static_cast<std::size_t>(m.end)] >= 0) continue;
     if (m.other_end < 2 && other.corner[static_cast<std::size_t>(m.other_end)] >= 0) continue;
 
+    // Both ends are moved to the crossing
     wall.corner[static_cast<std::size_t>(m.end)] = static_cast<int>(m.other);
     wall.corner_end[static_cast<std::size_t>(m.end)] = m.other_end;
     (m.end == 0 ? wall.s0 : wall.s1) = m.s;
     if (m.other_end == 2) continue;
 
+    // A face keeps its ends
     other.corner[static_cast<std::size_t>(m.other_end)] = static_cast<int>(m.wall);
     other.corner_end[static_cast<std::size_t>(m.other_end)] = m.end;
     (m.other_end == 0 ? other.s0 : other.s1) = m.other_s;
   }
 }
 
+/// Extends free ends to walls of which the part that they meet is hidden.
 void meet_hidden_walls(std::vector<WallLine>& walls) {
   constexpr double kNear_m = 0.06;
   constexpr double kHidden_m = 2.5;
@@ -94,9 +105,12 @@ void meet_hidden_walls(std::vector<WallLine>& walls) {
       double& own = end == 0 ? wall.s0 : wall.s1;
       double best = kNear_m, moved = own;
 
+      // The nearest line within reach
       for (const WallLine& other : all) {
         const double turn = other.normal.dot(wall.along());
         if (std::abs(turn) < kLeastTurn || other.length() < kShortest_m) continue;
+
+        // Distances to the crossing, and to the wall's visible end
         const double s = own + (other.offset_m - other.normal.dot(wall.at(own))) / turn;
         const double t = other.along().dot(wall.at(s));
         const double hidden = std::max(other.s0 - t, t - other.s1);

@@ -37,6 +37,7 @@ std::vector<WallRaster> rasters_of(const std::vector<WallLine>& walls, const clo
   return rasters;
 }
 
+/// An error with the heights of the points, from which a user can choose another cut.
 core::Error no_wall_error(const MapSource& source, const cloud::CloudFile& file) {
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
@@ -73,6 +74,7 @@ std::vector<WallLine> close_free_ends(const cloud::Cloud& cloud, double floor_m,
   find_far_sides(plan.walls, at_ends);
   std::vector<WallLine> closings;
 
+  // Each candidate is measured in the cloud
   for (const WallDoor& door : at_ends) {
     std::vector<WallDoor> measured{door};
     measure_doors(cloud, floor_m, measured);
@@ -82,6 +84,7 @@ std::vector<WallLine> close_free_ends(const cloud::Cloud& cloud, double floor_m,
              2.0 * (kSame_m + other.depth_m());
     });
 
+    // Both jambs must have been seen
     if (!again && m.jamb_seen[0] && m.jamb_seen[1] && m.width_m > kNarrowestDoor_m) {
       plan.doors.push_back(m);
     } else {
@@ -133,9 +136,12 @@ void set_thickness(std::vector<WallLine>& walls) {
 
 }  // namespace
 
+/// Moves a plan by a similarity, such as into world coordinates.
 WallPlan moved(WallPlan plan, const Eigen::Matrix2d& linear, const Eigen::Vector2d& origin) {
   const double scale = linear.col(0).norm();
   const auto move = [&](Eigen::Vector2d& place) { place = origin + linear * place; };
+
+  // Places along walls change with the origin
   for (WallLine& wall : plan.walls) {
     wall.normal = linear * wall.normal / scale;
     wall.offset_m = scale * wall.offset_m + wall.normal.dot(origin);
@@ -148,6 +154,7 @@ WallPlan moved(WallPlan plan, const Eigen::Matrix2d& linear, const Eigen::Vector
     }
   }
 
+  // Places of doors, furniture and rooms
   for (WallDoor& door : plan.doors) {
     for (auto* jambs : {&door.jambs, &door.far_jambs}) std::for_each(jambs->begin(), jambs->end(), move);
   }
@@ -177,6 +184,7 @@ core::Result<WallPlan> find_walls(MapSource& source) {
   const cloud::Cloud& points = *(*cloud)->cloud;
   WallPlan plan;
 
+  // Candidates for walls, of which some are furniture
   plan.walls = wall_sides(points, floor_m, cut_m, source.executor());
   drop_low_furniture(plan.walls);
   std::vector<WallRaster> rasters = rasters_of(plan.walls, points, floor_m);
@@ -193,6 +201,7 @@ core::Result<WallPlan> find_walls(MapSource& source) {
     plan.rays_known = true;
   }
 
+  // Views decide between walls and furniture
   drop_furniture(plan.walls, rasters, plan.rays_known);
   drop_loose_sides(plan.walls, rasters);
   constexpr double kLintel_m = 2.0;
@@ -202,6 +211,7 @@ core::Result<WallPlan> find_walls(MapSource& source) {
   cut_sides(plan.walls, rasters, cut);
   if (plan.walls.empty()) return tl::unexpected(no_wall_error(source, **cloud));
 
+  // Openings in walls, and pieces of one wall joined over them
   join_corners(plan.walls);
   for (std::size_t i = 0; i < plan.walls.size(); ++i)
     plan.walls[i].openings = openings_between(rasters[i], plan.walls[i].s0, plan.walls[i].s1, cut);
@@ -212,6 +222,7 @@ core::Result<WallPlan> find_walls(MapSource& source) {
     fronts.push_back({front, front});
   }
 
+  // Lines are fitted again, for joined pieces have more points
   bridge_gaps(plan.walls, fronts, cut);
   fit_sides(points, floor_m, source.executor(), plan.walls);
   join_corners(plan.walls);
@@ -225,12 +236,14 @@ core::Result<WallPlan> find_walls(MapSource& source) {
     }
   }
 
+  // Openings seen from both sides, then from one
   plan.doors = doors_of(plan.walls);
   const std::vector<WallDoor> more = doors_between_sides(plan.walls, fronts, cut);
   plan.doors.insert(plan.doors.end(), more.begin(), more.end());
   find_far_sides(plan.walls, plan.doors);
   measure_doors(points, floor_m, plan.doors);
 
+  // Free space is known: rooms may be open
   if (plan.rays_known) {
     std::vector<WallLine> closings = close_free_ends(points, floor_m, plan);
     for (const WallDoor& door : plan.doors) {
@@ -245,6 +258,7 @@ core::Result<WallPlan> find_walls(MapSource& source) {
     plan.rooms = rooms_of(plan.walls);
   }
 
+  // Leaves and windows need the final walls
   cut_walls_at(plan.doors, plan.walls);
   find_leaves(points, floor_m, plan.walls, plan.doors);
   const std::vector<WallDoor> windows = windows_of(points, floor_m, cut_m, plan.walls);

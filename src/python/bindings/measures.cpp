@@ -147,6 +147,7 @@ void compare(const fs::path& before, const fs::path& after, const fs::path& outp
 /// A result's cloud, paths and, if wanted, lines; `frame`: theirs.
 viz::Scene scene_of(const fs::path& input, bool lines, cloud::CloudFrame& frame) {
   viz::Scene scene;
+
   // A single cloud has no paths
   if (fs::is_regular_file(input) && input.extension() != ".db") {
     const cloud::CloudFile file = value_of(cloud::read_cloud(input, cloud::LargeCoordinates::kShifted));
