@@ -15,8 +15,8 @@ namespace {
 
 using geometry::Rigid3;
 
-constexpr double kReach_m = 0.02;      // of points that lie on a surface
-constexpr double kExplained = 0.7;     // share of a thing's places that must
+constexpr double kReach_m = 0.02;      // points this near to a surface are on it
+constexpr double kExplained = 0.7;     // least share of its places on a surface
 constexpr std::size_t kTargets = 12;   // pieces that it may have become, largest first
 constexpr std::size_t kSamples = 150;  // places of a thing that are tried
 
@@ -203,7 +203,7 @@ bool has_shape(const std::vector<Eigen::Vector3f>& normals) {
   return values[1] > 0.06 * values.sum();
 }
 
-/// Share of a thing's surroundings, along its faces, where the ground goes on: a piece of a wall is no thing.
+/// Share of an object's surroundings, along its faces, where the surface continues: a part of a wall does.
 double goes_on(const Samples& thing, const Ground& ground, const Rigid3& motion) {
   const PointSearch search(thing.points);
   PointSearch::Found found;

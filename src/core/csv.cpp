@@ -38,7 +38,7 @@ std::string csv_text(std::string_view field) {
   return text;
 }
 
-// Commas and line ends within quotes belong to the field
+/// The next field of a table; commas and line ends within quotes belong to it.
 CsvField next_csv_field(std::string_view table, std::size_t& at) {
   const std::size_t begin = at;
   bool quoted = false;

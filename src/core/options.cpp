@@ -230,7 +230,7 @@ void OptionTable::set_all(const ConfigNode& map, const std::string& path, Config
     const auto& [key, value] = map.entries[i];
     if (std::find(reserved.begin(), reserved.end(), key) != reserved.end()) continue;
 
-    // A problem of a key is reported at the key, of a value at the value
+    // An unknown key is reported where the key stands
     if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
       problems.push_back({map.key_marks[i], joined_path(path, key), "unknown key" + hint(key, keys)});
     } else {

@@ -100,7 +100,7 @@ ParsedNumber parse_in_range(const ConfigNode& node, double min, double max, cons
   return parsed;
 }
 
-// The ratio's name is left out, for users write none
+/// Units of the same quantity; a ratio is written without a unit.
 std::vector<std::string> units_like(const std::string& unit) {
   if (unit.empty()) return {};
   const Unit* own = find_unit(unit);

@@ -127,7 +127,7 @@ bool Mapper::wait(double seconds) const { return impl_->run.wait(seconds); }
 
 core::Result<Result> Mapper::finish() {
   return session::guarded([&] {
-    // Polled, because the run may end with an error at any time
+    // The run finishes the frames that were pushed
     close();
     while (!wait(1.0)) continue;
     return impl_->run.result().and_then(

@@ -46,7 +46,7 @@ void put_text_rows(core::OutputFile& out, const cloud::CloudFile& file, char bet
     if (!file.columns.observations.empty()) put(file.columns.observations[i], "{}");
     if (!file.columns.robot.empty()) put(static_cast<int>(file.columns.robot[i]), "{}");
 
-    // Each row without its first separator
+    // Further columns; the row's first separator is left out
     for (const auto& other : file.columns.others) put(other.values[i], "{:.4g}");
     row += '\n';
     out.write(row.data() + 1, row.size() - 1);

@@ -80,7 +80,7 @@ void put_extra_records(core::OutputFile& out, const std::vector<LasExtra>& extra
   }
 }
 
-/// Coordinates as integers: of the offset, in steps of the scale.
+/// Coordinates as integers: steps of the scale from the offset.
 struct LasSteps {
   Eigen::Vector3d offset;
   /// Rounded to the nearest step.

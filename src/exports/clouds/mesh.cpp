@@ -42,7 +42,7 @@ core::Result<cloud::PlyData> mesh_of(MapSource& source) {
   mesh_options.resolution_m = options.resolution_m > 0.0 ? options.resolution_m : kDefault_m;
   mesh_options.reach_m = options.reach_m;
 
-  // Libraries print while they reconstruct
+  // The library of the reconstruction prints to the terminal
   core::Result<cloud::PlyData> mesh;
   const auto work = [&] { mesh = cloud::make_mesh(*(*cloud)->cloud, mesh_options); };
   if (source.request().quietly) {

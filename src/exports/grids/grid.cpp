@@ -234,7 +234,7 @@ core::Result<void> set_cells(const cloud::CloudFile& cloud, const std::vector<Ex
   });
   if (!seen) return seen;
 
-  // Over a visible floor columns need to be empty up to tables only
+  // Over a visible floor, columns must be empty only up to the height of tables
   const double top_m = std::min(heights.high_m, heights.floor_m + kTableTop_m);
   for (std::size_t i = 0; i < grid.cells.size(); ++i) {
     if (measured.obstacle[i]) {

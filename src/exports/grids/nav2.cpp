@@ -44,7 +44,7 @@ core::Result<ExportSummary> write_nav2(MapSource& source, const std::filesystem:
   if (auto written = write_pgm(image, *grid, source.frame_text()); !written)
     return tl::unexpected(written.error());
 
-  // map_server's thresholds keep unknown cells unknown
+  // These thresholds keep unknown cells unknown
   const auto written = core::write_file(
       yaml, fmt::format("# {}\n# occupied: between {:g} and {:g} m over the floor\nimage: {}\nmode: trinary\n"
                         "resolution: {:g}\norigin: [{:.6f}, {:.6f}, 0]\nnegate: 0\noccupied_thresh: 0.65\n"

@@ -28,7 +28,7 @@ core::Result<ExportSummary> write_octomap(MapSource& source, const std::filesyst
   work.box = source.selected();
   work.views = [&](const auto& take) { return for_each_view(source, take); };
 
-  // The part returns bytes, so that files are written in one place
+  // The file appears only when it is whole
   const auto bytes = (*octomap)->make(work);
   if (!bytes) return tl::unexpected(bytes.error());
   if (auto written = core::write_file(output, *bytes); !written) return tl::unexpected(written.error());

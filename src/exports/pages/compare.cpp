@@ -32,7 +32,7 @@ std::vector<float> distances(const viewer::Points& points, const viewer::Points&
   const SearchedPoints searched{&others};
   const PointTree tree(3, searched, nanoflann::KDTreeSingleIndexAdaptorParams(16));
 
-  // Both clouds have a shift
+  // From one cloud's coordinates into the other's
   std::array<float, 3> shift{};
   for (std::size_t k = 0; k < 3; ++k) shift[k] = static_cast<float>(points.shift[k] - others.shift[k]);
 
@@ -44,7 +44,7 @@ std::vector<float> distances(const viewer::Points& points, const viewer::Points&
       const auto& [x, y, z] = points.positions[i];
       const std::array<float, 3> at{x + shift[0], y + shift[1], z + shift[2]};
 
-      // The index keeps the clouds' precision near the origin
+      // The nearest point itself, not its surface
       std::uint32_t nearest = 0;
       float squared = 0.0F;
       tree.knnSearch(at.data(), 1, &nearest, &squared);

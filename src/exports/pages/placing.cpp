@@ -199,7 +199,7 @@ std::optional<CommonPoses> common_poses(const std::vector<ExportPose>& first,
   common.count = pairs.from.size() / kPlacesOfPose;
   common.rms_m = rms_of(pairs, common.first_from_second, kPlacesOfPose);
 
-  // Longer paths may differ more
+  // Larger paths may differ more
   const double most_m = std::max(kApart_m, kApartOfRadius * radius_of(pairs));
   return rms_of(pairs, common.first_from_second, 1) <= most_m ? std::optional(common) : std::nullopt;
 }

@@ -310,7 +310,7 @@ core::Result<MapView> view_of(MapSource& source) {
   scene.floor_m = source.floor_m();
   scene.clouds.push_back(std::move(cloud->second));
 
-  // Missing parts leave the page without them
+  // Parts that the map lacks are left out
   add_paths(source, scene);
   if (auto added = add_keyframes(source, cloud->first, view); !added) return tl::unexpected(added.error());
   add_lines(source, scene);
@@ -335,7 +335,6 @@ core::Result<ExportSummary> write_view(MapSource& source, const std::filesystem:
         output.string()));
   }
 
-  // The scene of the map
   auto view = view_of(source);
   if (!view) return tl::unexpected(view.error());
 

@@ -67,7 +67,7 @@ core::Result<void> fill(const OctreeWork& work, Tree& tree, const Color& color) 
   });
   if (!seen) return seen;
 
-  // Both trees need inner nodes
+  // Inner nodes summarise their children
   add_occupied(*work.cloud, tree, color);
   tree.updateInnerOccupancy();
   tree.prune();

@@ -50,7 +50,7 @@ core::Result<void> describe_system(int epsg, Georeference& reference) {
         epsg, proj_get_name(system.get())));
   }
 
-  // GIS programs read this form of WKT
+  // WKT 1 as GDAL writes it, in one line
   const char* const options[] = {"MULTILINE=NO", nullptr};
   const char* text = proj_as_wkt(context.get(), system.get(), PJ_WKT1_GDAL, options);
   if (text == nullptr)
@@ -78,7 +78,7 @@ bool covers_origin(const Georeference& reference) {
                      proj_get_area_of_use(context.get(), system.get(), &west, &south, &east, &north, nullptr);
   if (!known || std::min({west, south, east, north}) < kUnknown) return true;
 
-  // Longitudes wrap around
+  // Degrees of the origin; longitudes wrap around
   const PJ_COORD at = proj_trans(from_degrees.get(), PJ_INV,
                                  proj_coord(reference.origin.x(), reference.origin.y(), 0.0, 0.0));
   if (!std::isfinite(at.xy.x + at.xy.y) || at.xy.y < south - kSlack || at.xy.y > north + kSlack) return false;

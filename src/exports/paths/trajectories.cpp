@@ -35,7 +35,7 @@ core::Result<ExportSummary> write_tum(MapSource& source, const std::filesystem::
   });
 }
 
-/// KITTI: a row with the upper three rows of the pose matrix, without stamps.
+/// KITTI: the upper 3 x 4 part of each pose matrix as a row, without stamps.
 core::Result<ExportSummary> write_kitti(MapSource& source, const std::filesystem::path& output) {
   const auto paths = paths_of(source);
   if (!paths) return tl::unexpected(paths.error());

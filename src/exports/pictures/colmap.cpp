@@ -109,7 +109,7 @@ core::Result<void> write_colmap_binary(const std::filesystem::path& folder, cons
     }
   }
 
-  // Failures of any file count
+  // A file that cannot be written fails the model
   if (auto done = cameras.commit(); !done) return done;
   if (auto done = images.commit(); !done) return done;
   return points.commit();
@@ -165,7 +165,7 @@ core::Result<void> write_colmap_text(const std::filesystem::path& folder, const 
     points.write("\n");
   }
 
-  // Failures of any file count
+  // A file that cannot be written fails the model
   if (auto done = cameras.commit(); !done) return done;
   if (auto done = images.commit(); !done) return done;
   return points.commit();
@@ -218,7 +218,7 @@ core::Result<ExportSummary> write_colmap(MapSource& source, const std::filesyste
   if (written) written = folder->commit();
   if (!written) return tl::unexpected(written.error());
 
-  // Names and numbers for the user
+  // The summary tells how many poses have a picture
   summary.written = {output};
   summary.notes.push_back(fmt::format("{}, {} points", pictures_text(model.pictures), model.points.size()));
   return summary;

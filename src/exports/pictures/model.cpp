@@ -189,7 +189,7 @@ core::Result<void> write_pictures(const MapSource& source, const Pictures& recor
     if (auto made = core::make_folder(folder / "depth"); !made) return made;
   }
 
-  // Blocks bound the memory of decoded pictures
+  // Pictures are written in parallel, block by block
   constexpr std::size_t kAtOnce = 16;  // for progress reports and bounded memory
   std::vector<core::Result<void>> written(pictures.size());
   std::vector<std::string> lost(pictures.size());
@@ -206,7 +206,7 @@ core::Result<void> write_pictures(const MapSource& source, const Pictures& recor
         return;
       }
 
-      // Depth goes with the colour image
+      // Depth has the name of its colour image
       const std::string file = pictures[i].name + ".png";
       written[i] = dataset::write_png(folder / "images" / file, frame->color);
       if (written[i] && depth && !recordings.stored())

@@ -67,7 +67,7 @@ double filled_share(const std::vector<Upright>& points, const Eigen::Vector2d& h
     high = std::max(high, p.z);
   }
 
-  // Something wider than the leaf is not the leaf
+  // Something longer than the leaf's width is no leaf
   double filled = 0.0, all = 0.0, beyond = 0.0;
   for (std::size_t i = 0; i < kMostBins; ++i) {
     const double r = (static_cast<double>(i) + 0.5) * kBin_m;

@@ -70,13 +70,13 @@ std::string svg_text(const Drawing& drawing) {
                          line.dashed ? " stroke-dasharray=\"2 1.2\"" : "");
     }
 
-    // All viewers get the same width of a text
+    // Texts are centred at their places
     for (const DrawnText& text : texts) {
       if (text.layer != layer) continue;
       const Eigen::Vector2d at = sheet.on_paper(text.at);
       const double height_mm = text.height_m / sheet.mm(), width_mm = text.width_m() / sheet.mm();
 
-      // Viewers lack the font, so the width is given
+      // textLength gives the same width with any font
       out += fmt::format(
           "<text transform=\"translate({:.3f} {:.3f}) rotate({:.2f})\" x=\"{:.3f}\" y=\"{:.3f}\" "
           "font-family=\"Helvetica, Arial, sans-serif\" font-size=\"{:.3f}\" textLength=\"{:.3f}\" "

@@ -47,7 +47,7 @@ double DrawnText::width_m() const {
   return width * height_m / kCapital;
 }
 
-// Turned so that it is read from below or from the right
+/// Corners of the text as it is drawn: read from below or from the right.
 std::vector<Eigen::Vector2d> box_of(const DrawnText& text, double room_m) {
   const double angle = readable_angle(text.angle_rad);
   const Eigen::Vector2d x =

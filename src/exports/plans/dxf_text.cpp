@@ -69,7 +69,7 @@ void put_dictionary(DxfText& dxf, const char* handle, const char* owner,
 
 }  // namespace
 
-// Characters beyond ASCII become \U+XXXX, in which R2000 takes them
+/// Text whose characters beyond ASCII are \U+XXXX, as R2000 reads them.
 std::string DxfText::encoded(const std::string& utf8) {
   std::string out;
   for (std::size_t i = 0; i < utf8.size(); ++i) {

@@ -27,7 +27,7 @@ void FreeSpace::add(const ViewRays& rays) {
   constexpr double kHigh_m = 2.4;
   ++view_;
 
-  // A view counts once for each cell that its rays pass
+  // Cells up to a little before the surface
   cameras_.emplace_back(rays.origin.head<2>());
   for (const Eigen::Vector3f& end : rays.ends) {
     const Eigen::Vector3d way = end.cast<double>() - rays.origin;
@@ -39,7 +39,7 @@ void FreeSpace::add(const ViewRays& rays) {
       if (cell < 0 || height < kLow_m || height > kHigh_m || last_[static_cast<std::size_t>(cell)] == view_)
         continue;
 
-      // Once for each view
+      // A view counts once for each cell
       last_[static_cast<std::size_t>(cell)] = view_;
       auto& count = views_[static_cast<std::size_t>(cell)];
       count = static_cast<std::uint16_t>(std::min(60000, count + 1));

@@ -46,7 +46,7 @@ void LabelPlaces::add(const DrawnLine& line) {
 
 void LabelPlaces::add(const DrawnText& text) { texts_.push_back(box_of(text, kLabelRoom * text.height_m)); }
 
-// Separating axis test with texts and lines
+/// True if the text's box is apart from all texts and lines.
 bool LabelPlaces::is_free(const DrawnText& text) const {
   const auto box = box_of(text, kLabelRoom * text.height_m);
   return std::none_of(texts_.begin(), texts_.end(),
@@ -60,7 +60,7 @@ bool LabelPlaces::is_free(const Eigen::Vector2d& a, const Eigen::Vector2d& b) co
   return std::none_of(texts_.begin(), texts_.end(), [&](const auto& box) { return !is_apart(box, {a, b}); });
 }
 
-/// Puts the text at the first free place, where others then may not be.
+/// Puts the text at the first free place, which is taken from then on.
 bool LabelPlaces::place(DrawnText& text, const std::vector<Eigen::Vector2d>& places) {
   for (const Eigen::Vector2d& at : places) {
     text.at = at;

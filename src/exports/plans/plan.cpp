@@ -47,7 +47,7 @@ core::Result<void> write_pages(const std::vector<Drawing>& pages, const std::fil
   return {};
 }
 
-// World coordinates exist only for plans that are drawn
+/// Writes a plan or a section; only plans that are drawn can be in world coordinates.
 core::Result<ExportSummary> write_plan(MapSource& source, const std::filesystem::path& output) {
   const auto world = georeference_of(source.options(), source.log());
   if (!world) return tl::unexpected(world.error());
@@ -59,7 +59,7 @@ core::Result<ExportSummary> write_plan(MapSource& source, const std::filesystem:
                     output.string()));
   }
 
-  // Pages of the drawing
+  // JSON has no sheets; a drawing has one for each storey
   if (json) return write_plan_json(source, output);
   ExportSummary summary;
   core::Result<std::vector<Drawing>> pages;

@@ -205,7 +205,7 @@ std::vector<PlanOutline> outlines_of(const std::vector<PlanSegment>& limits) {
       at = next;
     }
 
-    // Fewer corners are no area
+    // Two corners enclose no area
     if (outline.size() >= 3) outlines.push_back(std::move(outline));
   }
   return outlines;
@@ -293,7 +293,7 @@ void name_sides(const RoomWalls& of, WallRoom& room) {
 
   room.outline = std::move(corners);
 
-  // Runs of limits begin behind a side that is none
+  // Begins at a side that is no limit, so that no run is split
   const std::size_t count = room.sides.size();
   const auto other = std::find_if(room.sides.begin(), room.sides.end(),
                                   [](RoomSide side) { return side != RoomSide::kLimit; });

@@ -41,7 +41,7 @@ std::vector<Eigen::Vector2d> chain_from(const std::vector<WallLine>& walls, std:
   return from == 0 ? outline : std::vector<Eigen::Vector2d>{};
 }
 
-/// The middle of the widest piece of a line through the outline's middle.
+/// The middle of the widest piece inside of the lines at eighths of the outline's height.
 Eigen::Vector2d label_place(const std::vector<Eigen::Vector2d>& outline, const std::vector<Loop>& loops) {
   // Height range of the outline
   Eigen::Vector2d low = outline.front(), high = outline.front();

@@ -176,7 +176,7 @@ void draw_legend(Drawing& drawing, SheetWriter& writer, std::size_t layer, doubl
       drawing.line(layer, writer.at(x, middle), writer.at(x + 14, middle), true);
     }
 
-    // The next line of the legend
+    // Text next to the sample
     writer.text(x + 17.0, middle, text);
     y -= kLine_mm + 0.6;
   }

@@ -79,13 +79,13 @@ void join_corners(std::vector<WallLine>& walls) {
     if (wall.corner[static_cast<std::size_t>(m.end)] >= 0) continue;
     if (m.other_end < 2 && other.corner[static_cast<std::size_t>(m.other_end)] >= 0) continue;
 
-    // Both ends are moved to the crossing
+    // The wall's end moves to the crossing
     wall.corner[static_cast<std::size_t>(m.end)] = static_cast<int>(m.other);
     wall.corner_end[static_cast<std::size_t>(m.end)] = m.other_end;
     (m.end == 0 ? wall.s0 : wall.s1) = m.s;
     if (m.other_end == 2) continue;
 
-    // A face keeps its ends
+    // So does the other's end, unless its face was met
     other.corner[static_cast<std::size_t>(m.other_end)] = static_cast<int>(m.wall);
     other.corner_end[static_cast<std::size_t>(m.other_end)] = m.end;
     (m.other_end == 0 ? other.s0 : other.s1) = m.other_s;

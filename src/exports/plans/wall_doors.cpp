@@ -159,7 +159,7 @@ void bridge_gaps(std::vector<WallLine>& walls, std::vector<Fronts>& fronts, cons
                                       {cut.at_m, cut.low_m, cut.high_m, true});
       if (crossed && gap < kNarrowestDoor_m) continue;
 
-      // All else is wall that was hidden, or gaps in it
+      // An opening, else hidden wall with its gaps
       if (crossed || !cut.rays_known) {
         a.openings.push_back(widened(front, a, {a.s1, from}, cut));
       } else {
@@ -266,7 +266,7 @@ void find_far_sides(const std::vector<WallLine>& walls, std::vector<WallDoor>& d
     if ((door.far_jambs[0] - door.jambs[0]).norm() > kThinnest_m) continue;
     double nearest = kThickestWall_m;
 
-    // The nearest face that looks away
+    // The nearest face that points away
     for (const WallLine& wall : walls) {
       const double distance = behind.dot(wall.at(0.5 * (wall.s0 + wall.s1)) - door.jambs[0]);
       if (wall.normal.dot(behind) < 0.99 || distance < kThinnest_m || distance > nearest) continue;

@@ -42,7 +42,6 @@ bool stands_before_wall(const WallLine& side, const std::vector<WallLine>& walls
   constexpr double kReach_m = 0.4;
   constexpr double kSeenBehind = 0.6;  // share of the side
   bool before = false, behind = false;
-
   double seen_m = 0.0;
 
   // Walls that face the same way, further back
@@ -116,13 +115,13 @@ void drop_low_furniture(std::vector<WallLine>& walls) {
   walls.erase(std::remove_if(walls.begin(), walls.end(), is_furniture), walls.end());
 }
 
-/// Drops sides of furniture: low, looked over, or standing before a wall.
+/// Drops low sides that cameras saw over, and sides that stand before a wall.
 void drop_furniture(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, bool rays_known) {
   constexpr double kLongest_m = 3.0;  // longest furniture
   constexpr double kLeastHigh = 0.2;  // share of a side that must be higher than furniture
   const std::vector<WallLine> all = walls;
   keep_sides(walls, rasters, [&](std::size_t i) {
-    // A face of a thin wall may be low on one side
+    // Two low faces of a thin wall are a wall
     const bool high = walls[i].high >= kLeastHigh || walls[i].low ||
                       std::any_of(all.begin(), all.end(), [&](const WallLine& other) {
                         return other.high < kLeastHigh && are_faces(all[i], other);

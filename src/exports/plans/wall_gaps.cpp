@@ -75,7 +75,6 @@ std::vector<WallOpening> gaps_between(const WallRaster& raster, double s0, doubl
   constexpr double kNarrowest_m = 0.3;
   constexpr double kLowestSill_m = 0.25;
   const int begin = raster.column_of(s0);
-
   const int end = raster.column_of(s1);
 
   // Runs of columns without surface at the cut
@@ -125,7 +124,7 @@ void cut_sides(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, c
   }
 }
 
-/// A gap that is the better part of a door is the door.
+/// Drops gaps that cover most of a door, for they are that door.
 void drop_gaps_at_doors(WallLine& wall) {
   const auto is_door = [&](const WallOpening& gap) {
     return std::any_of(wall.openings.begin(), wall.openings.end(), [&](const WallOpening& door) {

@@ -126,7 +126,7 @@ std::vector<WallSolid> wall_solids(const WallPlan& plan, double unit) {
   const Eigen::Vector2d origin = plan.walls.front().at(plan.walls.front().s0);
   SolidArea known, assumed;
 
-  // Thickness between the ends of openings
+  // Each piece between openings has the thickness behind it
   for (const WallLine& wall : plan.walls) {
     std::vector<SolidPart> parts;
     for (const auto& [s0, s1] : solid_pieces(wall)) {

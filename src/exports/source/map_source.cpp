@@ -184,7 +184,7 @@ core::Result<void> MapSource::open_map() {
   return map.complete ? core::Result<void>{} : level_interrupted();
 }
 
-/// A run that was interrupted has not yet searched its floor.
+/// A run that was interrupted has not found its floor, so it is searched now.
 core::Result<void> MapSource::level_interrupted() {
   const auto frames = store_->trajectory();
   if (frames.empty()) {
@@ -332,7 +332,7 @@ core::Result<cloud::CloudFile> MapSource::read_cloud() const {
   auto fused = store_->fused(fusion, *executor_);
   if (!fused) return tl::unexpected(fused.error());
 
-  // Fused clouds have all columns
+  // Fused clouds always have colours and normals
   cloud::CloudFile file;
   file.cloud = std::move(fused->cloud);
   file.columns = std::move(fused->columns);
@@ -391,7 +391,7 @@ core::Result<std::vector<ExportPose>> MapSource::stored_poses(bool keyframes_onl
     }
   }
 
-  // Frames tell their keyframe, if they are one
+  // A frame with a keyframe's stamp is that keyframe
   for (std::size_t i = 0; !keyframes_only && i < poses.trajectory.size(); ++i) {
     const geometry::StampedPose& pose = poses.trajectory[i];
     const std::int32_t robot = poses.trajectory_ids[i].robot;

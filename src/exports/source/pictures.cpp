@@ -51,7 +51,7 @@ core::Result<std::vector<RecordingName>> recordings_of(const MapSource& source,
   const std::vector<std::string>& given = source.request().recordings;
   if (given.empty() && names.size() == robots) return names;
 
-  // A run of live frames has recorded no names
+  // Live runs, for example, name no recording
   if (given.empty()) {
     return core::input_error(fmt::format(
         "{}: does not say from which recordings it was made; name them with --recording, one for each robot",

@@ -144,7 +144,7 @@ PointCloudPtr make_cloud(const FloatArray& points, const std::optional<ByteArray
 
     p.b = colors ? colors->at(i, 2) : 255;
 
-    // Filters take points without a normal as not oriented
+    // NaN stands for an unknown normal
     constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
     p.normal_x = normals ? normals->at(i, 0) : kNone;
     p.normal_y = normals ? normals->at(i, 1) : kNone;
