@@ -63,6 +63,7 @@ cv::Mat relative_gradient(const cv::Mat& gray, int dx, int dy, cv::Size size) {
   return relative;
 }
 
+/// Depth steps along rows (`across`) or columns, in pixels of the working image from its centre.
 void add_steps(const cv::Mat& depth, bool across, double work_from_depth, std::vector<Edge>& edges) {
   const int outer = across ? depth.rows : depth.cols;
   const int inner = across ? depth.cols : depth.rows;
@@ -74,16 +75,21 @@ void add_steps(const cv::Mat& depth, bool across, double work_from_depth, std::v
       const float z = z_at(o, i);
       if (!(z > 0.0F)) continue;
 
+      // A wide hole may hide a slope.
       if (last >= 0 && i - last <= kMostGap) {
         const float before = z_at(o, last);
-
         if (std::abs(z - before) > kStep * std::min(z, before) + 0.03F) {
+          // The edge belongs to the nearer surface.
           const double at = z < before ? i - 0.5 : last + 0.5;
+
+          // Relative to the image's centre.
           const double u = (across ? at : o) * work_from_depth - 0.5 * (depth.cols * work_from_depth - 1.0);
           const double v = (across ? o : at) * work_from_depth - 0.5 * (depth.rows * work_from_depth - 1.0);
           edges.push_back({static_cast<float>(u), static_cast<float>(v), std::min(z, before), across});
         }
       }
+
+      // The last pixel with depth, on this side of holes.
       last = i;
     }
   }
@@ -127,6 +133,7 @@ struct Search {
   double spread = 1.0;
 };
 
+/// Scores of all scales and shifts in range.
 Search search(const std::vector<Frame>& frames, std::size_t half) {
   Search found;
   double sum = 0.0, squares = 0.0;
@@ -147,6 +154,7 @@ Search search(const std::vector<Frame>& frames, std::size_t half) {
     }
   }
 
+  // Spread of scores, to judge the best one.
   found.mean = sum / count;
   found.spread = std::sqrt(std::max(1e-9, squares / count - found.mean * found.mean));
   return found;

@@ -51,6 +51,7 @@ ScaledRigid3 align_points_scaled(const std::vector<Eigen::Vector3d>& source,
     target_mean += target[i] / static_cast<double>(source.size());
   }
 
+  // Least squares of the scale, with the rotation given.
   double common = 0.0;
   double spread = 0.0;
   for (std::size_t i = 0; i < source.size(); ++i) {

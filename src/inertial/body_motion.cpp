@@ -68,6 +68,8 @@ void BodyMotion::observe(const CameraStep& step) {
   const double dt = step.to - step.from;
   if (!(dt > 1e-3 && dt < 0.5)) return;
   const bool told = step.sigma_m < kMostSigma_m && step.moved.translation.allFinite();
+
+  // An uncertain step ends the stretch begun.
   if (!told) stretch_ = {};
   if (told && !rates_.empty()) learn_turn(step);
   if (told && !wheels_.empty()) learn_wheels(step);
@@ -124,11 +126,13 @@ tracking::SensedMotion BodyMotion::between(double earlier, double now) const {
   const double dt = now - earlier;
   if (!(dt > 0.0)) return sensed;
 
+  // Wheels measure the whole motion.
   if (wheel_use() == Use::kUsed && dt < kLongestWay_s) {
     const auto from = wheels_at(wheels_, earlier), to = wheels_at(wheels_, now);
     if (from && to) sensed.moved = camera_motion(to->inverse() * *from, *wheel_);
   }
 
+  // The gyroscope measures rotation and present turn rate.
   if (gyro_use() == Use::kUsed && dt < kLongestTurn_s) {
     sensed.turned = rates_.turned(earlier, now, *gyro_);
     const auto rate = rates_.mean(now + gyro_->delay_s - kMoment_s, now + gyro_->delay_s + kMoment_s);

@@ -74,6 +74,8 @@ std::optional<FeltUp> felt_up(const TurnRates& rates, const GyroCalibration& how
                               const std::vector<PathFrame>& path) {
   std::vector<Vector3d> felt;
   Vector3d sum = Vector3d::Zero();
+
+  // Accelerations, turned into the world.
   for (std::size_t i = 1; i < path.size(); ++i) {
     if (!path[i].camera_from_world || path[i].stamp - path[i - 1].stamp > 1.0) continue;
     const auto force = rates.acceleration(path[i - 1].stamp + how.delay_s, path[i].stamp + how.delay_s);
@@ -83,6 +85,7 @@ std::optional<FeltUp> felt_up(const TurnRates& rates, const GyroCalibration& how
   }
   if (felt.empty() || !(sum.norm() > 0.0)) return std::nullopt;
 
+  // Up is their mean, its accuracy their spread.
   FeltUp up{sum.normalized(), 0.0};
   for (const Vector3d& f : felt) {
     const double angle = std::acos(std::clamp(f.normalized().dot(up.direction), -1.0, 1.0));

@@ -19,6 +19,7 @@ using Normal = Eigen::Matrix<double, kUnknowns, kUnknowns>;
 
 constexpr double kAgrees = 16.8;  // chi-square, 6 degrees of freedom, 99 %
 
+/// The calibration after a step of the unknowns.
 WheelCalibration changed(const WheelCalibration& how, const Unknowns& by) {
   WheelCalibration result = how;
   result.scale *= std::exp(by[0]);
@@ -112,6 +113,8 @@ std::optional<Rigid3> wheels_at(const std::vector<dataset::OdometryReading>& rea
                                      [](double at, const auto& reading) { return at < reading.stamp; });
   if (next == readings.begin()) return std::nullopt;
   const auto& before = *(next - 1);
+
+  // Nothing is extrapolated past the last reading.
   if (next == readings.end())
     return before.stamp == stamp ? std::optional<Rigid3>(before.odom_from_body) : std::nullopt;
   const double gap = next->stamp - before.stamp;

@@ -70,6 +70,7 @@ Rgb robot_color(float robot) {
                                                : Rgb{150, 150, 150};
 }
 
+/// One channel per axis of the scene; grey without a normal.
 Rgb normal_color(const Point& p, const SceneAxes& axes) {
   const Eigen::Vector3d n = normal(p);
   if (!(n.norm() > 0.1)) return {150, 150, 150};
@@ -80,6 +81,7 @@ Rgb normal_color(const Point& p, const SceneAxes& axes) {
   return {channel(axes.right), channel(axes.forward), channel(axes.up)};
 }
 
+/// Colours before shading, and the scale that explains them.
 PointColors base_colors(const Scene& scene, const std::vector<std::uint32_t>& points,
                         const SnapshotOptions& options, const SceneAxes& axes) {
   const auto& cloud = *scene.cloud;
@@ -100,6 +102,8 @@ PointColors base_colors(const Scene& scene, const std::vector<std::uint32_t>& po
       std::vector<double> heights;
       heights.reserve(points.size());
       for (const auto i : points) heights.push_back(position(cloud[i]).dot(axes.up));
+
+      // Quantiles, for outliers must not stretch the scale.
       const double floor = core::quantile(heights, 0.01, 0.0);
       for (double& h : heights) h -= floor;
       const double top = std::max(0.1, core::quantile(heights, 0.98, 0.0));
@@ -112,6 +116,8 @@ PointColors base_colors(const Scene& scene, const std::vector<std::uint32_t>& po
       std::vector<double> values;
       values.reserve(points.size());
       for (const auto i : points) values.push_back(scene.scalars[i]);
+
+      // The map's name of its values comes first.
       const std::string fallback =
           options.color == ColorMode::kError ? "error (m)" : color_mode_name(options.color);
       return color_by_value(values, options.scalar_range.value_or(value_range(values)),
@@ -178,6 +184,7 @@ std::vector<std::uint32_t> visible_points(const Scene& scene, const Projection& 
   return cull && enough ? facing : all;
 }
 
+/// The nearest point of each cell, for it covers farther ones.
 std::vector<std::uint32_t> nearest_per_cell(const Scene& scene, const std::vector<std::uint32_t>& points,
                                             const Projection& projection, double cell_px) {
   constexpr std::uint32_t kNone = 0xffffffffU;
@@ -196,12 +203,14 @@ std::vector<std::uint32_t> nearest_per_cell(const Scene& scene, const std::vecto
                         at.z() > projection.near_m && at.z() < projection.far_m;
     if (!inside) continue;
 
+    // Depth test.
     const auto cell = static_cast<std::size_t>(row * columns + column);
     if (static_cast<float>(at.z()) >= depth[cell]) continue;
     depth[cell] = static_cast<float>(at.z());
     nearest[cell] = i;
   }
 
+  // In the order of the cloud.
   nearest.erase(std::remove(nearest.begin(), nearest.end(), kNone), nearest.end());
   std::sort(nearest.begin(), nearest.end());
   return nearest;

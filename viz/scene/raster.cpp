@@ -42,6 +42,8 @@ void Raster::draw_point(const Eigen::Vector3d& at, double diameter_px, const Rgb
         at.y() - radius < first_row_ + depth_.rows)) {
     return;
   }
+
+  // The disc, row by row.
   const int end = first_from(at.y() + radius);
   for (int row = first_from(at.y() - radius); row < end; ++row) {
     const double up = row + 0.5 - at.y();

@@ -133,11 +133,14 @@ Subdivision draw_office(int alike, bool hall, Rng& rng) {
   const double high = hall ? rng.uniform(6.5, 9.5) : rng.uniform(3.6, 6.5);
   const double length =
       std::max({rng.uniform(16.0, 30.0), alike > 1 ? 6.5 + 3.2 * alike : 0.0, hall ? 24.5 : 0.0});
+
+  // Rooms on both sides of a corridor.
   Subdivision s({length, low + corridor + high}, rng.uniform(0.28, 0.45));
   const int middle = cut(s, 0, 1, low + corridor, rng, false).value_or(0);
   const int lowest = cut(s, middle, 1, low, rng, false).value_or(0);
   cell(s, middle).kind = "corridor";
 
+  // Special rooms are cut off first.
   if (alike > 1) slice_alike(s, 0, alike, rng);
   if (hall) cut_hall(s, 0, rng);
   slice(s, 0, 2.4, rng.uniform(5.0, 9.0), rng);
@@ -206,12 +209,17 @@ Subdivision draw_storey(const BuildingFrame& frame, int rooms, int alike, bool h
   const auto level = [&](int index, double y) {
     return s.split(index, {0.0, y}, -Vector2d::UnitX(), kThickness).value_or(0);
   };
+
+  // A corridor between two rows of rooms.
   const int middle = level(0, frame.low + frame.corridor);
   const int lowest = level(middle, frame.low);
   cell(s, middle).kind = "corridor";
+
+  // Stairs at one end of the lower row.
   const int stairs = s.split(lowest, {frame.stairs, 0.0}, Vector2d::UnitY(), kThickness).value_or(0);
   cell(s, stairs).kind = "stairs";
 
+  // The upper row gets the larger half.
   const int high = std::max((rooms + 1) / 2, alike > 1 ? alike + 2 : 0);
   if (alike > 1) slice_alike(s, 0, alike, rng);
   if (hall) cut_hall(s, 0, rng);

@@ -85,6 +85,7 @@ core::Result<Scene> make_layout(const std::string& kind, const SynthOptions& opt
         fmt::format("layout: '{}' has no layouts; {} have", kind, fmt::join(kinds, ", ")));
   }
 
+  // Not every kind has every option.
   if (std::max(options.like, options.copies) > 1 && (kind == "home" || kind == "corridor")) {
     return core::usage_error(
         fmt::format("like, copies: a {} has no rooms alike; office and building have", kind));
@@ -95,12 +96,15 @@ core::Result<Scene> make_layout(const std::string& kind, const SynthOptions& opt
         "hall: an office or a building has one, where no rooms are alike; leave out hall, or like and "
         "copies");
   }
+
+  // A lift needs storeys and one robot.
   if (options.lift && (kind != "building" || options.floors < 2 || options.robots > 1)) {
     return core::usage_error(
         "lift: a building of two storeys or more has one, in which one robot rides; leave out lift, or give "
         "`building`, floors and robots=1");
   }
 
+  // Not every draw makes a valid plan.
   constexpr int kAttempts = 200;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     auto scene = try_layout(kind, options, attempt, false);
@@ -108,6 +112,7 @@ core::Result<Scene> make_layout(const std::string& kind, const SynthOptions& opt
     if (!*scene) continue;
     if (options.changes.empty()) return std::move(**scene);
 
+    // The same attempt, with the changes.
     scene = try_layout(kind, options, attempt, true);
     if (!scene) return tl::unexpected<core::Error>(scene.error());
     if (*scene) return std::move(**scene);
@@ -123,6 +128,8 @@ core::Result<Scene> make_layout(const std::string& kind, const SynthOptions& opt
 core::Result<Scene> open_scene(const std::string& name_or_file, const SynthOptions& options,
                                const std::filesystem::path& scenes_folder) {
   if (options.layout >= 0) return make_layout(name_or_file, options);
+
+  // Some kinds exist only as layouts.
   if (name_or_file == "home" || name_or_file == "building") {
     return core::usage_error(
         fmt::format("{} is made from a number: give --layout N, in an address layout=N", name_or_file));
@@ -132,6 +139,8 @@ core::Result<Scene> open_scene(const std::string& name_or_file, const SynthOptio
         fmt::format("path: '{}' is for worlds made from a number (layout); the paths of {} are in its file",
                     to_string(options.path), name_or_file));
   }
+
+  // Scenes from files can be changed too.
   auto scene = load_scene(name_or_file, scenes_folder);
   if (scene && !options.changes.empty()) {
     if (auto done = apply_changes(options, *scene); !done) return tl::unexpected<core::Error>(done.error());

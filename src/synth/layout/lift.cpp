@@ -50,9 +50,11 @@ void build_lift_storey(const LiftShaft& shaft, int index, bool lowest, bool high
   const double m = shaft.middle(), y = shaft.door - kFront, top = highest ? height : height - kSlab;
   const Vector2d low = shaft.box.min(), high = shaft.box.max();
 
+  // The shaft stays open above the lowest floor.
   b.begin_object("floor", fmt::format("floor of lift {}", index), mark);
   solid({low.x(), lowest ? low.y() : y, -kSlab}, {high.x(), high.y(), 0.0}, "tiles");
 
+  // The front, with an opening for the door.
   b.begin_object("wall", fmt::format("front of lift {}", index), mark);
   solid({low.x(), y, 0.0}, {m - kHalf, shaft.door, top}, "paint_blue");
   solid({m + kHalf, y, 0.0}, {high.x(), shaft.door, top}, "paint_blue");
@@ -63,6 +65,7 @@ void build_lift_storey(const LiftShaft& shaft, int index, bool lowest, bool high
   b.begin_object("lamp", "", mark);
   add_ceiling_lamp(b, upright({m, 0.5 * (shaft.door + high.y()), top}, 0.0), 0.5, 0.5, 9.0);
 
+  // The shaft ends at the top.
   if (!highest) return;
   b.begin_object("ceiling", fmt::format("ceiling of lift {}", index), mark);
   b.polygon({{low.x(), high.y(), top},
@@ -114,6 +117,8 @@ void add_lift(const LiftShaft& shaft, const std::vector<double>& storeys, Scene&
 std::vector<Vector3d> lift_ride(const LiftShaft& shaft, double from, double to) {
   const double m = shaft.middle(), front = shaft.door - kFront, middle = 0.5 * (front + shaft.back());
   std::vector<Vector3d> out = {{m, shaft.door + 0.6, from}, {m, front - 0.3, from}, {m - 0.25, middle, from}};
+
+  // Small sideways motion during the ride.
   constexpr int kPieces = 6;
   for (int i = 0; i <= kPieces; ++i) {
     const double s = static_cast<double>(i) / kPieces;

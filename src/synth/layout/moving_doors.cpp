@@ -13,12 +13,15 @@ namespace plumbline::synth {
 using Eigen::Vector2d;
 
 double MovingDoor::angle(double t) const {
+  // Sampled angles are interpolated.
   if (!shares.empty()) {
     const double at = std::clamp(t / kShareStep, 0.0, static_cast<double>(shares.size() - 1));
     const auto i = std::min(static_cast<std::size_t>(at), shares.size() - 2);
     const double s = at - static_cast<double>(i);
     return (1.0 - s) * shares[i] + s * shares[i + 1];
   }
+
+  // Otherwise smoothly there, held, and back.
   const auto next = std::upper_bound(starts.begin(), starts.end(), t);
   if (next == starts.begin()) return rest_rad;
   const double since = t - *std::prev(next);
@@ -114,6 +117,8 @@ void plan_swings(const std::vector<std::vector<Eigen::Vector3d>>& all, const Eig
                  double reach, MovingDoor& door, Rng& rng) {
   door.swing = rng.uniform(1.0, 2.2);
   door.hold = rng.uniform(1.0, 5.0);
+
+  // Times with a camera near the door.
   std::vector<char> near;
   for (const auto& places : all) {
     near.resize(std::max(near.size(), places.size()), 0);
@@ -123,6 +128,7 @@ void plan_swings(const std::vector<std::vector<Eigen::Vector3d>>& all, const Eig
     }
   }
 
+  // Swings begin in gaps that are long enough.
   const auto length = static_cast<std::size_t>((2.0 * door.swing + door.hold) / kLookStep) + 2;
   auto at = static_cast<std::size_t>(rng.uniform(0.5, 6.0) / kLookStep);
   while (at + length <= near.size()) {
@@ -131,6 +137,8 @@ void plan_swings(const std::vector<std::vector<Eigen::Vector3d>>& all, const Eig
       at += 5;
       continue;
     }
+
+    // The next swing comes after a pause.
     door.starts.push_back(static_cast<double>(at) * kLookStep);
     at += length + static_cast<std::size_t>(rng.uniform(2.0, 12.0) / kLookStep);
   }

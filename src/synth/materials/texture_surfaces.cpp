@@ -254,6 +254,8 @@ Canvas draw_rug(const Material& m, cv::Size size, std::uint64_t seed) {
   for (int i = 0; i < cells; ++i) {
     for (int k = 0; k < cells; ++k) {
       const cv::Point c(i * step + step / 2, k * step + step / 2);
+
+      // Diamonds from the outside in.
       for (int ring = 3; ring >= 0; --ring) {
         const int r = step * (ring + 1) / 9;
         const std::vector<cv::Point> diamond = {c + cv::Point(r, 0), c + cv::Point(0, r), c - cv::Point(r, 0),
