@@ -32,6 +32,7 @@ double yaw_of(const geometry::Rigid3& world_from_body) {
   return std::atan2(ahead.y(), ahead.x());
 }
 
+/// Errors of one device at the start of a recording.
 ImuErrors draw_imu(const ImuModel& model, Rng& rng) {
   ImuErrors e;
   e.gyro_bias = normals(rng, model.gyro_bias);
@@ -63,10 +64,13 @@ std::vector<dataset::ImuReading> imu_readings(const SynthSource& source, const I
   const double first = source.info(0).stamp, last = source.info(source.size() - 1).stamp;
   for (double t = first; t <= last + step; t += step) {
     const PathMotion motion = source.motion(t, camera_from_body);
+
+    // The accelerometer measures force, hence gravity too.
     const Vector3d force = motion.world_from_frame.rotation.transpose() * (motion.acceleration - gravity);
     const Vector3d gyro = gyro_axes * motion.turn_rate + gyro_bias + normals(rng, model.gyro_noise * root);
     const Vector3d accel = accel_axes * force + accel_bias + normals(rng, model.accel_noise * root);
 
+    // Biases drift, and readings are lost.
     gyro_bias += normals(rng, model.gyro_walk * std::sqrt(step));
     accel_bias += normals(rng, model.accel_walk * std::sqrt(step));
     if (rng.chance(model.gaps / 60.0 * step)) silent_until = t + 0.05;

@@ -25,6 +25,8 @@ class KeptRound {
       const std::lock_guard<std::mutex> lock(mutex_);
       packed = frames_[index];
     }
+
+    // Unpacking needs no lock.
     if (packed[0].bytes.empty()) return std::nullopt;
     dataset::StoredPair pair;
     pair.color.pixels = packed[0].image();
@@ -33,6 +35,7 @@ class KeptRound {
   }
 
   void keep(std::size_t index, const dataset::StoredPair& pair) {
+    // Packing needs no lock.
     Packed packed{PackedImage(pair.color.pixels), PackedImage(pair.depth.pixels)};
     const std::size_t size = packed[0].bytes.size() + packed[1].bytes.size();
     const std::lock_guard<std::mutex> lock(mutex_);

@@ -54,6 +54,8 @@ std::vector<Stamps> make_stamps(const SynthOptions& o, const std::vector<Event>&
     const double t = static_cast<double>(i) / o.fps;
     const double jitter = ideal ? 0.0 : rng.uniform(-0.0012, 0.0012),
                  other = ideal ? 0.0 : rng.uniform(-0.0006, 0.0006);
+
+    // Dropped frames leave a gap in the numbers.
     bool dropped = false;
     for (const Event& e : events) dropped = dropped || (e.kind == EventKind::kDrop && e.active(t));
     const double stamp = whole_us(kFirstStamp + t + jitter);
@@ -141,6 +143,7 @@ void SynthSource::Impl::repeat() {
   round = frames.size();
   kept = std::make_shared<KeptRound>(round);
 
+  // Later rounds have later stamps and events.
   for (std::size_t first = once; first < wanted; first += once) {
     const double later = static_cast<double>(first) / o.fps;
     for (std::size_t i = 0; i < round; ++i) {
@@ -168,6 +171,7 @@ core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(const std::sh
         fmt::format("robot {} of {}: robots count from 0 to {}", robot, recordings(o), recordings(o) - 1));
   }
 
+  // The cameras of a rig share one path.
   const auto paths = world->scene.robots.size();
   const int driver = o.rig.empty() ? robot : 0;
   const RobotPath& way = world->scene.robots[static_cast<std::size_t>(driver) % paths];
@@ -184,6 +188,7 @@ core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(const std::sh
     impl->camera.color_from_depth = Rigid3();
   }
 
+  // The camera that the recording reports.
   auto told = told_camera(o, robot, impl->camera);
   if (!told) return tl::unexpected<core::Error>(told.error());
   impl->told = std::move(*told);
@@ -223,6 +228,8 @@ core::Result<std::unique_ptr<SynthSource>> SynthSource::create(const std::shared
   auto planned = plan(world, robot);
   if (!planned) return tl::unexpected<core::Error>(planned.error());
   std::unique_ptr<Impl> impl = std::move(*planned);
+
+  // Only rendering needs marks and noise.
   impl->marks =
       LensMarks(impl->color_faults, {impl->camera.color.width, impl->camera.color.height}, impl->seed);
   impl->tiles = make_noise(impl->world->options.sensor, impl->seed);
@@ -277,10 +284,13 @@ core::Result<dataset::StoredPair> SynthSource::stored(std::size_t index) const {
     return core::input_error(fmt::format("{}: frame {} of {}", impl_->name, index, impl_->frames.size()));
   }
 
+  // Later rounds repeat the frames of the first.
   const std::size_t first = index % impl_->round;
   if (impl_->kept == nullptr) return rendered(index);
   if (auto pair = impl_->kept->find(first)) return std::move(*pair);
   dataset::StoredPair pair = rendered(index);
+
+  // Kept only if another round follows.
   if (first + impl_->round < size()) impl_->kept->keep(first, pair);
   return pair;
 }
@@ -295,6 +305,7 @@ core::Result<sensor::RgbdFrame> SynthSource::read(std::size_t index) const {
   frame.stamp = at.stamp;
   frame.depth_stamp = at.depth_stamp;
 
+  // Rectified to the reported camera.
   frame.color = rectifier ? rectifier->color(pair->color.pixels) : pair->color.pixels;
   cv::cvtColor(frame.color, frame.gray, cv::COLOR_BGR2GRAY);
   if (rectifier) {

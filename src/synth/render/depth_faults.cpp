@@ -76,6 +76,7 @@ FaultyDepth lit_depth(const World& world, const View& view, const DepthFaults& f
       float& z = depth(y, x);
       if (face < 0 || !(z > 0.0F)) continue;
 
+      // Mirrors show the depth of mirror images.
       const Material& m = *world.materials[static_cast<std::size_t>(face)];
       const float cosine = incidence(view, face, x, y);
       const bool fixed = static_cast<std::size_t>(face) < world.fixed_faces;
@@ -87,12 +88,14 @@ FaultyDepth lit_depth(const World& world, const View& view, const DepthFaults& f
         continue;
       }
 
+      // Grazing, dark and glossy surfaces return nothing.
       const bool glint = m.gloss > 0.25F && cosine > 0.995F;
       if (faults.holes > 0.0 && (static_cast<double>(cosine) < faults.holes || m.infrared < 0.1F || glint)) {
         z = 0.0F;
         continue;
       }
 
+      // Light from surrounding surfaces lengthens the path.
       if (faults.multipath > 0.0 && fixed) {
         const auto cell = static_cast<std::size_t>(x / kCell);
         if (last_face[cell] != face) enclosed[cell] = bounces.enclosure(face, x, y, z);

@@ -67,6 +67,8 @@ class Recent {
     const std::lock_guard lock(mutex_);
     if (!slot.value) bytes_ += size_(*made);
     slot.value = made;
+
+    // The longest unused values make room.
     while (bytes_ > most_) {
       Slot* oldest = nullptr;
       for (Slot& other : slots_) {

@@ -24,6 +24,8 @@ FigurePose Walker::pose(double t) const {
   const auto i = static_cast<std::size_t>(at);
   const double s = at - std::floor(at);
   const FigurePose &a = day[i], &b = day[i + 1];
+
+  // Between two poses of the day.
   FigurePose out;
   out.hip = a.hip + s * (b.hip - a.hip);
   out.yaw = a.yaw + s * wrap(b.yaw - a.yaw);
@@ -92,20 +94,20 @@ void add_walker(Builder& b, const Walker& walker, int part) {
   b.begin_object("walker", "", walker.mark);
   const Skin clothes{walker.material}, skin{"terracotta"}, trousers{"fabric"};
   if (walker.day.empty()) {
+    // Without a day's poses: a simple figure.
     const Vector3d way = walker.to - walker.from;
     const geometry::Rigid3 frame = upright(walker.from, std::atan2(way.y(), way.x()));
     b.box(frame, {-0.15, -0.25, 0.0}, {0.15, 0.25, 1.42}, clothes);
     b.box(frame, {-0.1, -0.09, 1.42}, {0.12, 0.09, 1.7}, skin);
-
     return;
   }
 
+  // One part of a figure with limbs.
   const geometry::Rigid3 frame =
       part_frames(walker.day.front(), walker.carries)[static_cast<std::size_t>(part)];
   if (part == kTrunk) {
     b.box(frame, {-0.11, -0.2, -0.08}, {0.11, 0.2, 0.56}, clothes);
     b.box(frame, {-0.1, -0.08, 0.58}, {0.11, 0.08, 0.86}, skin);
-
     if (walker.carries) b.box(frame, {0.3, -0.2, 0.08}, {0.6, 0.2, 0.34}, {"cardboard"});
   } else if (part < kShin) {
     b.box(frame, {-0.08, -0.075, -kLimb - 0.03}, {0.08, 0.075, 0.05}, trousers);
@@ -130,6 +132,8 @@ float inverse_depth(const View& view, int face, float x, float y) {
 int MovingFaces::nearer(const View& view, const Spot& spot, int best, float x, float y) const {
   const float here = inverse_depth(view, static_cast<int>(spot.face), x, y);
   if (here <= inverse_depth(view, best, x, y)) return best;
+
+  // The hit, in the frame of the face at rest.
   const Vector3d ray = view.world_from_camera.rotation * view.camera.unproject(x, y, 1.0);
   const Face& face = world_.scene.faces[spot.face];
   const Vector3d d =

@@ -123,6 +123,8 @@ geometry::Rigid3 World::motion(const Mover& mover, double t) const {
     swung.translation = (door.angle(t) - door.lit) * door.slide;
     return swung;
   }
+
+  // Doors turn about the hinge.
   swung.rotation = Eigen::AngleAxisd(leaf.open_rad - door.angle(t), Vector3d::UnitZ()).toRotationMatrix();
   swung.translation = leaf.hinge - swung.rotation * leaf.hinge;
   return swung;
@@ -131,14 +133,17 @@ geometry::Rigid3 World::motion(const Mover& mover, double t) const {
 Hit World::cast(const Vector3d& origin, const Vector3d& direction, double far) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
+
+  // Embree takes single precision.
   RTCRayHit query{};
   query.ray.org_x = static_cast<float>(origin.x());
   query.ray.org_y = static_cast<float>(origin.y());
   query.ray.org_z = static_cast<float>(origin.z());
   query.ray.dir_x = static_cast<float>(direction.x());
-
   query.ray.dir_y = static_cast<float>(direction.y());
   query.ray.dir_z = static_cast<float>(direction.z());
+
+  // All geometry, up to a distance.
   query.ray.tfar = static_cast<float>(far);
   query.ray.mask = 0xffffffffU;
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
@@ -171,6 +176,7 @@ void World::cast_packet(const float origin[3], const float* dx, const float* dy,
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   alignas(64) RTCRayHit16 q;
 
+  // All rays start at one place.
   for (int k = 0; k < kPacket; ++k) {
     q.ray.org_x[k] = origin[0];
     q.ray.org_y[k] = origin[1];
@@ -179,7 +185,7 @@ void World::cast_packet(const float origin[3], const float* dx, const float* dy,
     q.ray.dir_y[k] = dy[k];
     q.ray.dir_z[k] = dz[k];
     q.ray.tnear[k] = 0.0F;
-
+    // No limit of distance, no hit yet.
     q.ray.tfar[k] = std::numeric_limits<float>::infinity();
     q.ray.time[k] = 0.0F;
     q.ray.mask[k] = 0xffffffffU;
@@ -252,12 +258,12 @@ void World::prepare_textures() {
 core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const SynthOptions& options,
                                                        const core::Executor&) {
   if (auto ok = check(options); !ok) return tl::unexpected<core::Error>(ok.error());
+
+  // Surfaces, robots and known materials are needed.
   if (scene.faces.empty())
     return core::usage_error(fmt::format("scene '{}' has no surfaces; add `objects:`", scene.name));
-
   if (scene.robots.empty())
     return core::usage_error(fmt::format("scene '{}' has no robots; add `robots:`", scene.name));
-
   for (const Face& face : scene.faces) {
     if (find_material(face.material) == nullptr) {
       return core::usage_error(fmt::format("scene '{}': no material '{}'", scene.name, face.material));
@@ -268,6 +274,8 @@ core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const
     return core::usage_error(fmt::format(
         "moving_doors: doors swing in worlds made from a number (layout), not in scene '{}'", scene.name));
   }
+
+  // Doors and people that the options add.
   Scene peopled = scene;
   choose_moving_doors(options, peopled);
   if (!add_people(options.walkers, options.seed, peopled)) {
@@ -277,6 +285,7 @@ core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const
                     scene.name, scene.walkers.size(), options.walkers));
   }
 
+  // Cameras must not run into anything.
   auto world = std::make_shared<World>(std::move(peopled), options);
   if (auto free = check_paths(world); !free) return tl::unexpected<core::Error>(free.error());
   world->prepare_textures();

@@ -83,6 +83,7 @@ void Builder::anchor(Face& face, const Vector3d& foot) {
 
 void Builder::box(const Rigid3& f, const Vector3d& lo, const Vector3d& hi, const Skin& skin,
                   const Skin* front) {
+  // Corners by their end of each axis: 0 low, 1 high.
   const auto p = [&](int x, int y, int z) {
     return f * Vector3d(x ? hi.x() : lo.x(), y ? hi.y() : lo.y(), z ? hi.z() : lo.z());
   };
@@ -102,6 +103,8 @@ void Builder::cylinder(const Rigid3& f, const Vector3d& bottom, double radius, d
     const double angle = 2.0 * M_PI * i / segments;
     return Vector3d(f * (bottom + Vector3d(r * std::cos(angle), r * std::sin(angle), z)));
   };
+
+  // Sides, collecting both rims.
   std::vector<Vector3d> top, foot;
   for (int i = 0; i < segments; ++i) {
     const Vector3d a = ring(i, radius, 0.0), b = ring(i + 1, radius, 0.0);
@@ -110,6 +113,8 @@ void Builder::cylinder(const Rigid3& f, const Vector3d& bottom, double radius, d
     top.push_back(d);
     foot.insert(foot.begin(), a);
   }
+
+  // Both ends.
   const Vector3d u = f.rotation.col(0);
   polygon(top, u, skin);
   polygon(foot, u, skin);

@@ -28,6 +28,7 @@ bool read_waypoint(const ConfigNode& node, const std::string& path, double heigh
   table.number("pitch", w.pitch_rad, {-1.5, 1.5}, "rad", "Angle by which the camera looks up");
   table.number("yaw", w.yaw_rad, {-7.0, 7.0}, "rad", "Angle by which the camera looks left");
 
+  // The short form is the position alone.
   if (node.kind == ConfigNode::Kind::kSequence) {
     table.set("at", node, path, problems);
   } else {
@@ -40,6 +41,7 @@ bool read_waypoint(const ConfigNode& node, const std::string& path, double heigh
     return false;
   }
 
+  // Height of the path unless given.
   w.position = {at[0], at[1], at.size() == 3 ? at[2] : height};
   if (!look.empty()) w.look = Vector3d(look[0], look[1], look[2]);
   return true;
@@ -81,11 +83,11 @@ void read_robot(const ConfigNode& node, std::size_t index, RobotPath& robot, Con
     robot.waypoints.push_back(w);
   }
 
+  // The camera must move.
   double length = 0.0;
   for (std::size_t i = 1; i < robot.waypoints.size(); ++i) {
     length += (robot.waypoints[i].position - robot.waypoints[i - 1].position).norm();
   }
-
   if (robot.waypoints.size() == list->items.size() && length < 0.01) {
     problems.push_back({list->mark, path + ".path", "all waypoints are the same place"});
   }
@@ -115,7 +117,6 @@ void read_walkers(const ConfigNode& list, Scene& scene, ConfigProblems& problems
     const ConfigNode& node = list.items[i];
     const std::string path = fmt::format("walkers[{}]", i);
     std::vector<double> from, to;
-
     Walker walker;
     walker.mark = node.mark;
     core::OptionTable table;
@@ -124,6 +125,7 @@ void read_walkers(const ConfigNode& list, Scene& scene, ConfigProblems& problems
     table.number("speed", walker.speed, {0.02, 5.0}, "m/s", "Speed");
     table.choice("material", walker.material, material_names(), "Material of the clothes");
 
+    // A walk needs two places.
     const std::size_t before = problems.size();
     table.set_all(node, path, problems);
     if (problems.size() != before) continue;
@@ -150,6 +152,7 @@ void read_root(const ConfigNode& root, Scene& scene, ConfigProblems& problems) {
   table.set_all(root, "", problems, {"objects", "robots", "walkers"});
   scene.motion = motion == "wheeled" ? Motion::kWheeled : Motion::kHandheld;
 
+  // Errors in events are reported at their line.
   if (auto parsed = parse_events(events)) {
     scene.events = *parsed;
   } else {
@@ -157,6 +160,7 @@ void read_root(const ConfigNode& root, Scene& scene, ConfigProblems& problems) {
     problems.push_back({node != nullptr ? node->mark : root.mark, "events", parsed.error().message});
   }
 
+  // Things, in the order of the file.
   Builder builder(scene);
   if (const ConfigNode* objects = root.find("objects")) {
     read_objects(*objects, builder, problems);
