@@ -203,7 +203,7 @@ std::vector<std::uint32_t> nearest_per_cell(const Scene& scene, const std::vecto
                         at.z() > projection.near_m && at.z() < projection.far_m;
     if (!inside) continue;
 
-    // Depth test.
+    // Depth test within the cell.
     const auto cell = static_cast<std::size_t>(row * columns + column);
     if (static_cast<float>(at.z()) >= depth[cell]) continue;
     depth[cell] = static_cast<float>(at.z());

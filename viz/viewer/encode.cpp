@@ -40,6 +40,7 @@ std::uint64_t mixed(std::uint64_t value) {
   return value ^ value >> 29U;
 }
 
+/// Raw deflate stream of the bytes.
 std::string packed(const std::vector<std::uint8_t>& bytes) {
   const std::unique_ptr<libdeflate_compressor, decltype(&libdeflate_free_compressor)> compressor(
       core::made(libdeflate_alloc_compressor(kCompression)), &libdeflate_free_compressor);
@@ -171,6 +172,7 @@ std::string packed_points(const Points& points, const Grid& grid, const std::vec
   const std::size_t n = chosen.size();
   std::vector<std::uint8_t> bytes((points.colored ? 9 : 6) * n);
 
+  // Differences of successive points compress well.
   Steps before{};
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t k = 0; k < 3; ++k) {
@@ -180,8 +182,11 @@ std::string packed_points(const Points& points, const Grid& grid, const std::vec
     }
     before = grid.steps[chosen[i]];
   }
+
+  // Without colours that is all.
   if (!points.colored) return packed(bytes);
 
+  // Colours, with reduced chrominance.
   std::array<Plane, 3> planes{Plane(bytes, 6 * n), Plane(bytes, 7 * n), Plane(bytes, 8 * n)};
   for (const std::size_t i : chosen) {
     const auto& [r, g, b] = points.colors[grid.order[i]];
@@ -215,6 +220,8 @@ std::string packed_normals(const Points& points, const Grid& grid, const std::ve
   for (const std::size_t i : chosen) {
     const auto& [x, y, z] = points.normals[grid.order[i]];
     const Eigen::Vector3d normal = shown({x, y, z}, z_up);
+
+    // Zero stands for unknown normals.
     const bool known = normal.allFinite() && normal.squaredNorm() > 0.25;
     const std::array<int, 2> at = known ? folded(normal) : std::array<int, 2>{};
     first.put(at[0]);
@@ -243,6 +250,7 @@ std::string packed_layer(const Layer& layer, const Grid& grid, const std::vector
   for (const std::size_t i : chosen) {
     const int step = step_of(layer, layer.values[grid.order[i]]);
     if (wide) {
+      // All low bytes, then all high bytes.
       bytes[at] = static_cast<std::uint8_t>(step & 0xFF);
       bytes[n + at++] = static_cast<std::uint8_t>(step >> 8);
     } else {

@@ -40,7 +40,7 @@ core::Result<std::vector<Edit>> read_edits(const std::string& file) {
     table.integer("door", edit.door, {0, 10000}, "", "Door to open to `open`");
     table.number("light", edit.light, {0.01, 100.0}, "", "Factor on all light");
 
-    // Their arguments.
+    // Arguments of the edits.
     table.numbers("by", edit.by, 2, {-100.0, 100.0}, "m", "Way");
     table.numbers("at", edit.at, 0, {-1000.0, 1000.0}, "m", "Place");
     table.numbers("size", edit.size, 3, {0.01, 20.0}, "m", "Size");

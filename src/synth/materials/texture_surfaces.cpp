@@ -99,7 +99,7 @@ Canvas draw_wood(const Material& m, cv::Size size, std::uint64_t seed) {
     }
   }
 
-  // Pores.
+  // Fine pores over everything.
   modulate(canvas, grain(size, seed + 3), 0.05F);
   return canvas;
 }

@@ -152,7 +152,7 @@ Result<void> write_truth(const Job& job, std::size_t frames) {
     shares[i] = write_moving(job.source, i, job.folder, job.options.moving_masks);
   });
 
-  // The first failure.
+  // One failed frame fails all.
   std::vector<double> moving;
   for (const auto& share : shares) {
     if (!share) return tl::unexpected<core::Error>(share.error());

@@ -97,7 +97,7 @@ nlohmann::json describe_robot(const SynthSource& source, const std::string& fold
       {"last_stamp", last.stamp},
       {"start", {{"position_m", {t.x(), t.y(), t.z()}}, {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}}}};
 
-  // Errors, to compare estimates with.
+  // Errors that estimates are compared with.
   if (!options.camera_error.empty()) {
     json["camera"] = {{"file", describe_camera(source.camera())},
                       {"true", describe_camera(source.true_camera())}};

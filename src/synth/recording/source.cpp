@@ -119,6 +119,8 @@ core::Result<void> SynthSource::Impl::check_way() const {
   for (int i = 1; i <= steps; ++i) {
     const double t = i * kStep;
     const Vector3d to = at(t).translation;
+
+    // Nothing may be between two successive places.
     const Vector3d step = to - here;
     const double length = step.norm();
     if (length > 1e-7) {
@@ -151,6 +153,8 @@ void SynthSource::Impl::repeat() {
       if (first + static_cast<std::size_t>(at.number) >= wanted) break;
       frames.push_back({at.number, whole_us(at.color + later), whole_us(at.depth + later)});
     }
+
+    // Events repeat in each round.
     for (Event event : world->events) {
       event.start_s += later;
       events.push_back(event);

@@ -26,7 +26,7 @@ PathMotion SynthSource::motion(double stamp, const Rigid3& camera_from_frame) co
   const auto at = [&](double t) { return impl_->pose(t) * camera_from_frame; };
   const Rigid3 before = at(stamp - kStep), now = at(stamp), after = at(stamp + kStep);
 
-  // Central differences.
+  // Central differences over two steps.
   return {now, (after.translation - before.translation) / (2.0 * kStep),
           (after.translation - 2.0 * now.translation + before.translation) / (kStep * kStep),
           geometry::log_so3(before.rotation.transpose() * after.rotation) / (2.0 * kStep)};

@@ -49,6 +49,8 @@ LensMarks::LensMarks(const ColorFaults& faults, const cv::Size& size, std::uint6
       for (double left = 0.0; left < size.width; left += pitch) {
         const int x = static_cast<int>(left + rng.uniform(0.0, pitch)),
                   y = static_cast<int>(top + rng.uniform(0.0, pitch));
+
+        // Dots past the border are left out.
         if (x >= size.width || y >= size.height) continue;
         dots_(y, x) = static_cast<float>(255.0 * faults.dots);
         if (x + 1 < size.width) dots_(y, x + 1) = static_cast<float>(150.0 * faults.dots);

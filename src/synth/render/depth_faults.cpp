@@ -76,11 +76,13 @@ FaultyDepth lit_depth(const World& world, const View& view, const DepthFaults& f
       float& z = depth(y, x);
       if (face < 0 || !(z > 0.0F)) continue;
 
-      // Mirrors show the depth of mirror images.
+      // The surface, and the angle at which it is seen.
       const Material& m = *world.materials[static_cast<std::size_t>(face)];
       const float cosine = incidence(view, face, x, y);
       const bool fixed = static_cast<std::size_t>(face) < world.fixed_faces;
       const float reflectance = m.gloss + (1.0F - m.gloss) * std::pow(1.0F - cosine, 5.0F);  // Schlick
+
+      // Mirrors show the depth of mirror images.
       if (faults.mirrors > 0.0 && fixed && m.gloss >= 0.1F &&
           static_cast<double>(reflectance) > faults.mirrors) {
         z = bounces.mirrored(face, x, y, z);

@@ -59,6 +59,8 @@ void fill_hidden(LightMap& map, std::vector<char>& hidden) {
         // Mean of the known neighbours.
         float sum = 0.0F;
         int count = 0;
+
+        // Eight neighbours, fewer at the border.
         for (int y = std::max(0, j - 1); y <= std::min(map.rows - 1, j + 1); ++y) {
           for (int x = std::max(0, i - 1); x <= std::min(map.columns - 1, i + 1); ++x) {
             const auto k = static_cast<std::size_t>(y * map.columns + x);
@@ -102,6 +104,8 @@ double lamps_at(const World& world, const Vector3d& p, const Face& face) {
         const Vector3d d = q - p;
         const double r2 = d.squaredNorm(), r = std::sqrt(r2);
         const double cosines = face.normal.dot(d) * -lamp.normal.dot(d) / r2;
+
+        // Behind the surface or the lamp, or too near.
         if (face.normal.dot(d) <= 0.0 || lamp.normal.dot(d) >= 0.0 || r < 0.02) continue;
         if (world.free_distance(p, d / r, r - 0.02) < r - 0.021) continue;
         part += cosines / std::max(r2, 0.05);

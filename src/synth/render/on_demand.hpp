@@ -75,6 +75,8 @@ class Recent {
         if (other.value && &other != &slot && (oldest == nullptr || other.asked < oldest->asked))
           oldest = &other;
       }
+
+      // The new value alone may exceed the limit.
       if (oldest == nullptr) break;
       bytes_ -= size_(*oldest->value);
       oldest->value.reset();

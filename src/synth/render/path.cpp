@@ -133,6 +133,8 @@ CameraPath::CameraPath(const RobotPath& robot, const Options& options) : closed_
   for (long i = 0; i <= last; ++i) {
     const double t = step_ * static_cast<double>(i);
     while (k + 2 < samples.size() && samples[k + 1].time < t) ++k;
+
+    // Interpolated between two samples.
     const Sample &a = samples[k], &b = samples[k + 1];
     const double s = std::clamp((t - a.time) / std::max(b.time - a.time, 1e-12), 0.0, 1.0);
     knots_.push_back({a.position + s * (b.position - a.position), a.yaw + s * (b.yaw - a.yaw),
@@ -244,7 +246,7 @@ CameraPath::Knot CameraPath::spline(double t) const {
   const double weights[4] = {(1 - x) * (1 - x) * (1 - x) / 6.0, (3 * x * x * x - 6 * x * x + 4) / 6.0,
                              (-3 * x * x * x + 3 * x * x + 3 * x + 1) / 6.0, x * x * x / 6.0};
 
-  // Cubic B-spline.
+  // A cubic B-spline smooths the knots.
   Knot sum{Vector3d::Zero(), 0.0, 0.0, 0};
   for (int k = 0; k < 4; ++k) {
     const Knot at = knot(i - 1 + k);

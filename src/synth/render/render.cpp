@@ -266,6 +266,8 @@ void smooth_borders(const World& world, const View& view, const Shader& shader, 
     const int *row = ids[y], *up = ids[std::max(0, y - 1)], *low = ids[std::min(ids.rows - 1, y + 1)];
     for (int x = 0; x < ids.cols; ++x) {
       const int id = row[x];
+
+      // One of four neighbours is another face.
       if (up[x] != id || low[x] != id || row[std::max(0, x - 1)] != id ||
           row[std::min(ids.cols - 1, x + 1)] != id) {
         pixels.emplace_back(x, y);

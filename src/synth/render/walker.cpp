@@ -105,6 +105,8 @@ void add_walker(Builder& b, const Walker& walker, int part) {
   // One part of a figure with limbs.
   const geometry::Rigid3 frame =
       part_frames(walker.day.front(), walker.carries)[static_cast<std::size_t>(part)];
+
+  // Trunk and head, thigh, shin with shoe, or arm.
   if (part == kTrunk) {
     b.box(frame, {-0.11, -0.2, -0.08}, {0.11, 0.2, 0.56}, clothes);
     b.box(frame, {-0.1, -0.08, 0.58}, {0.11, 0.08, 0.86}, skin);

@@ -24,6 +24,8 @@ World::World(Scene s, SynthOptions o) : scene(std::move(s)), options(std::move(o
   if (auto more = parse_events(options.events)) events.insert(events.end(), more->begin(), more->end());
   fixed_faces = scene.faces.size();
   const std::size_t walkers = std::min(scene.walkers.size(), static_cast<std::size_t>(options.walkers));
+
+  // People consist of moving parts.
   for (std::size_t i = 0; i < walkers; ++i) {
     for (int part = 0; part < walker_parts(scene.walkers[i]); ++part) {
       const std::size_t first = scene.faces.size();
@@ -39,6 +41,8 @@ World::World(Scene s, SynthOptions o) : scene(std::move(s)), options(std::move(o
     const MovingDoor& door = scene.moving_doors[i];
     const DoorLeaf& leaf = scene.leaves[door.leaf];
     movers.push_back({i, -1, scene.faces.size(), leaf.count + door.body.size()});
+
+    // Copies at the place where their light is computed.
     for (std::size_t k = leaf.first; k < leaf.first + leaf.count; ++k) {
       gone[k] = 1;
       scene.faces.push_back(Face(scene.faces[k]));
@@ -185,6 +189,7 @@ void World::cast_packet(const float origin[3], const float* dx, const float* dy,
     q.ray.dir_y[k] = dy[k];
     q.ray.dir_z[k] = dz[k];
     q.ray.tnear[k] = 0.0F;
+
     // No limit of distance, no hit yet.
     q.ray.tfar[k] = std::numeric_limits<float>::infinity();
     q.ray.time[k] = 0.0F;
@@ -243,6 +248,8 @@ void World::prepare_textures() {
 
   for (const Job& job : jobs)
     texture_sizes.push_back(texture_size(*job.material, options.texture, job.aspect));
+
+  // Textures are drawn when they are first needed.
   constexpr std::size_t kMostBytes = 96U << 20U;
   const auto draw = [jobs, texture = options.texture](std::size_t k) {
     return draw_texture(*jobs[k].material, texture, jobs[k].seed, jobs[k].aspect);

@@ -114,7 +114,7 @@ void Builder::cylinder(const Rigid3& f, const Vector3d& bottom, double radius, d
     foot.insert(foot.begin(), a);
   }
 
-  // Both ends.
+  // Polygons close both ends.
   const Vector3d u = f.rotation.col(0);
   polygon(top, u, skin);
   polygon(foot, u, skin);

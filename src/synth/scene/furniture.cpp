@@ -51,7 +51,7 @@ void add_chair(Builder& b, const Rigid3& f, const std::string& material) {
     b.box(arm, {0.26, -0.02, 0.0}, {0.30, 0.02, 0.06}, {"plastic_black"});
   }
 
-  // Armrests.
+  // Armrests on both sides.
   for (const double s : {-1.0, 1.0}) {
     b.box(f, {s * 0.27 - 0.025, -0.14, 0.66}, {s * 0.27 + 0.025, 0.14, 0.69}, {"plastic_black"});
     b.box(f, {s * 0.27 - 0.015, -0.02, 0.47}, {s * 0.27 + 0.015, 0.02, 0.66}, {"plastic_black"});
@@ -165,6 +165,8 @@ void add_plant(Builder& b, const Rigid3& f, double height) {
                                  {0.35 * length, -0.5 * width, s * t},
                                  {length, 0.0, s * t},
                                  {0.35 * length, 0.5 * width, s * t}};
+
+      // Both sides face outwards.
       if (s < 0.0) std::swap(p[1], p[3]);
       for (Vector3d& corner : p) corner = leaf * corner;
       b.polygon(p, leaf.rotation.col(0), {"leaf"});
@@ -217,6 +219,8 @@ void add_clutter(Builder& b, const Rigid3& f, double width, double depth, int co
     } else {
       const double w = std::min(0.5 * cell, rng.uniform(0.07, 0.16)), d = rng.uniform(0.08, 0.14);
       const double h = kind < 0.6 ? rng.uniform(0.015, 0.05) : rng.uniform(0.08, 0.22);
+
+      // Each cover has a different print.
       const Skin cover{kCovers[static_cast<std::size_t>(rng.uniform(0.0, 4.999))], true, b.seed() * 16 + i};
       b.box(item, {-w, -d, 0.0}, {w, d, h}, cover, &cover);
     }

@@ -118,6 +118,8 @@ bool read_opening(const ConfigNode& node, const std::string& path, bool window, 
     o.bottom = 0.9;
     o.height = 1.2;
   }
+
+  // Settings by the kind of opening.
   bool leaf = true;
   r.length("at", o.at, 0.0, 500.0).length("width", o.width, 0.1, 50.0).length("bottom", o.bottom, 0.0, 20.0);
   r.length("height", o.height, 0.1, 20.0);

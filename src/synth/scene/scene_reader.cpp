@@ -117,6 +117,8 @@ void read_walkers(const ConfigNode& list, Scene& scene, ConfigProblems& problems
     const ConfigNode& node = list.items[i];
     const std::string path = fmt::format("walkers[{}]", i);
     std::vector<double> from, to;
+
+    // Settings of one walker.
     Walker walker;
     walker.mark = node.mark;
     core::OptionTable table;

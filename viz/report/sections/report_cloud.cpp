@@ -111,10 +111,13 @@ std::optional<CloudExtent> measure_extent(const cloud::Cloud& cloud) {
   CloudExtent extent;
   const auto outer = static_cast<std::ptrdiff_t>(kOuter * static_cast<double>(count));
 
+  // Bounds of each axis.
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<float>& v = values[static_cast<std::size_t>(axis)];
     const auto [low, high] = std::minmax_element(v.begin(), v.end());
     extent.low[axis] = *low;
+
+    // Bounds without outliers.
     extent.high[axis] = *high;
     std::nth_element(v.begin(), v.begin() + outer, v.end());
     extent.central_low[axis] = v[static_cast<std::size_t>(outer)];
@@ -131,12 +134,15 @@ std::optional<viz::SvgBackground> plan_of(const ReportData& data) {
   if (!data.extent) return std::nullopt;
   const auto [low, high] = shown(*data.extent);
   const auto [across, up] = plan_axes(data);
+
+  // Cells no finer than pixels and voxels.
   const double longest = std::max(high[across] - low[across], high[up] - low[up]);
   const double cell_m =
       std::max({longest / kPlanPixels, 1.5 * number_at(data.summary, "/cloud/voxel_m"), 1e-3});
   const cv::Mat counts = counted(data, low, high, cell_m);
   const double most = std::log1p(darkest(counts));
 
+  // Opacity by the logarithm of the count.
   cv::Mat picture(counts.size(), CV_8UC4);
   for (int row = 0; row < counts.rows; ++row) {
     for (int column = 0; column < counts.cols; ++column) {
@@ -180,6 +186,8 @@ std::string cloud_html(const ReportData& data) {
     }
 
     add_robots(data, facts);
+
+    // The file may have been changed since.
     const double counted = number_at(data.summary, "/cloud/points");
     const auto found = static_cast<double>(data.cloud->cloud->size());
     if (counted != found) {

@@ -27,6 +27,7 @@ std::string verdict_html(const ReportData& data) {
   const double without = number_at(s, "/frames/lost") + number_at(s, "/frames/unreadable");
   const std::string sentence = text_at(s, "/verdict/sentence");
 
+  // The verdict, then what limits it.
   std::string out;
   if (!flag_at(s, "/trustworthy")) {
     const std::string reason = text_at(s, "/reason");
@@ -85,6 +86,7 @@ std::string figures_html(const ReportData& data) {
                          : std::pair{std::string("frames a second"), filled(s, "{/timing/fps:1}")}});
 }
 
+/// Frames read and tracked, with exceptions if there are any.
 std::string frames_text(const ReportData& data) {
   const auto& s = data.summary;
   std::string text = filled(s, "{/frames/read} of {/frames/available} read, {/frames/tracked} tracked");
@@ -96,6 +98,7 @@ std::string frames_text(const ReportData& data) {
   return text;
 }
 
+/// Axes and origin of the results.
 std::string frame_of_results(const ReportData& data) {
   const std::string up = text_at(data.summary, "/frame/up");
   const std::string x =
@@ -170,6 +173,7 @@ std::string lost_html(const ReportData& data) {
     return a.lost + a.unreadable > b.lost + b.unreadable;
   };
 
+  // Longest first, up to a limit.
   std::stable_sort(stretches.begin(), stretches.end(), longer);
   std::string columns = ">from (s)|>to (s)|>frames|>lost|>unreadable|>between the poses around (m)";
   const bool several = data.frames.size() > 1;
