@@ -190,7 +190,7 @@ std::vector<Sign> lag_signs(const Samples& samples) {
   const double none = correlation(motions, 0.0, 0.0);
   double constant = none, best = none, delay = 0.0, begin = 0.0, drift = 0.0, quick_constant = 0.0;
 
-  // The best delay, and the best delay that grows.
+  // The best constant delay, and the best one that grows linearly.
   for (double d = -kMostDelay_s; d <= kMostDelay_s + 1e-9; d += kDelayStep_s) {
     quick_constant = std::max(quick_constant, correlation(quick, d, 0.0));
 

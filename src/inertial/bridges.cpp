@@ -42,7 +42,7 @@ Vector3d place_between(const std::vector<PathFrame>& path, std::size_t a, std::s
 std::vector<std::size_t> bridge(const TurnRates& rates, const GyroCalibration& how,
                                 std::vector<PathFrame>& path) {
   constexpr double kLongest_s = 1.0;
-  constexpr double kMostOff_rad = 0.1;  // of the turn at the other end: it is another place
+  constexpr double kMostOff_rad = 0.1;  // difference at the other end; more is another place
   std::vector<std::size_t> bridged;
   std::size_t last = path.size();
   for (std::size_t i = 0; i < path.size(); ++i) {
@@ -50,7 +50,7 @@ std::vector<std::size_t> bridge(const TurnRates& rates, const GyroCalibration& h
     const std::size_t first = std::exchange(last, i);
     if (first >= i || first + 1 == i || path[i].stamp - path[first].stamp > kLongest_s) continue;
 
-    // The gyroscope's error at the other end is shared out.
+    // The gyroscope's error at the other end is distributed.
     const auto turned = rates.turned(path[first].stamp, path[i].stamp, how);
     if (!turned) continue;
     const Matrix3d& begin = path[first].camera_from_world->rotation;

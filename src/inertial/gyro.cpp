@@ -39,7 +39,7 @@ std::vector<RatePair> rate_pairs(const TurnRates& rates, const std::vector<Camer
 /// Rotation and bias with camera = R (sensor - bias), in turns; a bias is expected to be small.
 GyroCalibration fit_axes(const std::vector<RatePair>& pairs) {
   constexpr int kTurns = 8;
-  constexpr double kNoise_s = 0.5;  // what the expectation is worth, as if it had been seen so long
+  constexpr double kNoise_s = 0.5;  // weight of the expectation, as of so long a measurement
   GyroCalibration found;
 
   // In turns, for each is estimated with the other one given.

@@ -13,7 +13,7 @@ using geometry::Vector6d;
 
 namespace {
 
-constexpr int kUnknowns = 8;  // log of scale, log of turn scale, how the body sits (6)
+constexpr int kUnknowns = 8;  // log of scale, log of turn scale, pose of the camera on the body (6)
 using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
 using Normal = Eigen::Matrix<double, kUnknowns, kUnknowns>;
 
@@ -30,13 +30,14 @@ WheelCalibration changed(const WheelCalibration& how, const Unknowns& by) {
   return result;
 }
 
-/// Standard deviations of what is expected: wheels are right to 10 %, the body sits as told.
+/// Standard deviations beforehand: wheels are right to 10 %, the camera is mounted as given, if that is
+/// known.
 Unknowns expected_sigma(bool known) {
   const double turn = known ? 0.03 : 0.3, place = known ? 0.02 : 0.5;
   return (Unknowns() << 0.1, 0.1, turn, turn, turn, place, place, place).finished();
 }
 
-/// Difference of a stretch by wheels and by pictures, in standard deviations.
+/// Difference of a stretch by wheels and by the camera, in standard deviations.
 Vector6d difference(const WheelStretch& stretch, const WheelCalibration& how) {
   const double length = stretch.camera.translation.norm();
   const double angle = geometry::rotation_angle(stretch.camera.rotation);
@@ -52,7 +53,7 @@ struct WheelFit {
   double cost = 0.0;
 };
 
-/// Least squares with weights that slip loses, Gauss-Newton with numeric derivatives.
+/// Robust least squares, in which slip loses its weight: Gauss-Newton with numeric derivatives.
 WheelFit fit_wheels(const std::vector<WheelStretch>& stretches, const WheelCalibration& start, bool known) {
   constexpr int kRounds = 8;
   constexpr double kStep = 1e-5;
@@ -101,7 +102,7 @@ WheelFit fit_wheels(const std::vector<WheelStretch>& stretches, const WheelCalib
 }  // namespace
 
 Rigid3 camera_motion(const Rigid3& body, const WheelCalibration& how) {
-  // Translation as seen from where the body was, for it is the way that is scaled.
+  // Translation in the first frame of the body, for the distance travelled is scaled.
   const Vector3d way = how.scale * (body.rotation.transpose() * body.translation);
   const Eigen::Matrix3d turn = geometry::exp_so3(how.turn_scale * geometry::log_so3(body.rotation));
   return how.body_from_camera.inverse() * Rigid3(turn, turn * way) * how.body_from_camera;
@@ -124,7 +125,7 @@ std::optional<Rigid3> wheels_at(const std::vector<dataset::OdometryReading>& rea
 
 WheelCalibration calibrate_wheels(const std::vector<WheelStretch>& stretches, const Rigid3& start,
                                   bool known) {
-  // A camera whose place is not told may look any way.
+  // Without a known mounting the camera's heading may be any.
   WheelFit best;
   best.cost = 1e300;
   for (int quarter = 0; quarter < (known ? 1 : 4); ++quarter) {

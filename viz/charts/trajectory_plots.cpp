@@ -106,7 +106,7 @@ std::array<std::vector<double>, 3> angles_of(const Trajectory& trajectory) {
   return angles;
 }
 
-/// Moves a whole curve by full turns so that it starts beside a value of another.
+/// Moves a whole curve by full turns so that it starts near a value of another.
 void start_beside(std::vector<double>& degrees, double other) {
   if (degrees.empty()) return;
   const double turns = 360.0 * std::round((other - degrees.front()) / 360.0);

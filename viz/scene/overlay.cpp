@@ -15,7 +15,7 @@ namespace {
 constexpr Rgb kInk{45, 48, 54};
 constexpr Rgb kFaint{110, 114, 122};
 constexpr Rgb kWhite{255, 255, 255};
-constexpr Rgb kGround{250, 250, 248};  // background of text that points may lie behind
+constexpr Rgb kGround{250, 250, 248};  // background of text in front of points
 constexpr double kTextSize = 22.0;     // in pixels, if the picture is 1200 px high
 
 Eigen::Vector2d on_picture(const Projection& projection, const Eigen::Vector3d& p) {

@@ -364,7 +364,7 @@ class Renderer {
 
 }  // namespace
 
-/// Only this thread calls VTK; selecting data, drawing points and writing pictures run beside it.
+/// Only this thread calls VTK; others select data, draw points and write pictures.
 core::Result<void> render_snapshots(const Scene& scene, const std::vector<Snapshot>& snapshots,
                                     const core::Executor& executor) {
   // Mistakes are reported before anything is drawn.

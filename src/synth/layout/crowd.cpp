@@ -32,7 +32,7 @@ struct Seat {
   double yaw;
 };
 
-/// Writes down a person's poses, one after the other.
+/// Records a person's poses, one after the other.
 class Day {
  public:
   Day(const Vector2d& at, double yaw, double floor, double speed) : floor_(floor), speed_(speed) {
@@ -46,7 +46,7 @@ class Day {
     for (int n = static_cast<int>(std::lround(seconds / kFigureStep)); n > 0; --n) poses_.push_back(now_);
   }
 
-  /// On the spot: first one foot is put down anew, then the other.
+  /// On the spot: first one foot is put down again, then the other.
   void turn(double yaw) {
     const FigurePose before = now_;
     const double angle = wrap(yaw - before.yaw);
@@ -82,7 +82,7 @@ class Day {
       now_.hip = lifted(point(line, s * length), floor_ + kHipHeight);
       now_.yaw = heading(line, s * length);
 
-      // Feet swing in turn.
+      // Left and right are half a cycle apart.
       for (const int side : {0, 1}) {
         const int k = side + 2 * static_cast<int>(std::floor((steps + 0.5 - side) / 2.0));
         const double from = std::max(0.0, k + 0.5), to = std::min(k + 1.5, static_cast<double>(count));

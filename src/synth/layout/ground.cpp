@@ -283,7 +283,7 @@ std::vector<Vector2d> Ground::way(const Vector2d& from, const Vector2d& to) cons
   cv::Mat1i before(free_.size(), -1);
   std::priority_queue<Entry> open;
 
-  // A shorter way to a cell replaces the known one.
+  // A cheaper way to a cell replaces the known one.
   const auto push = [&](const cv::Point& c, float value, int from_cell) {
     if (value >= cost(c)) return;
     cost(c) = value;

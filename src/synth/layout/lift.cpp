@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A lift in place of a building's stairs. Its cab has no door of its own: who rides sees the shaft pass by.
+// A lift in place of a building's stairs. Its cab has no door, so that a rider sees the shaft pass by.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -13,7 +13,7 @@ namespace plumbline::synth {
 using Eigen::Vector2d;
 
 double MovingDoor::angle(double t) const {
-  // Sampled angles are interpolated.
+  // Sampled values are interpolated.
   if (!shares.empty()) {
     const double at = std::clamp(t / kShareStep, 0.0, static_cast<double>(shares.size() - 1));
     const auto i = std::min(static_cast<std::size_t>(at), shares.size() - 2);

@@ -65,7 +65,7 @@ std::vector<dataset::ImuReading> imu_readings(const SynthSource& source, const I
   for (double t = first; t <= last + step; t += step) {
     const PathMotion motion = source.motion(t, camera_from_body);
 
-    // The accelerometer measures force, hence gravity too.
+    // Specific force: acceleration less gravity.
     const Vector3d force = motion.world_from_frame.rotation.transpose() * (motion.acceleration - gravity);
     const Vector3d gyro = gyro_axes * motion.turn_rate + gyro_bias + normals(rng, model.gyro_noise * root);
     const Vector3d accel = accel_axes * force + accel_bias + normals(rng, model.accel_noise * root);

@@ -13,7 +13,8 @@
 
 namespace plumbline::synth {
 
-/// Any thread may ask. Frames that do not fit into kMostBytes are not kept: they are rendered again.
+/// Safe to call from any thread. Frames that do not fit into kMostBytes are not kept: they are rendered
+/// again.
 class KeptRound {
  public:
   static constexpr std::size_t kMostBytes = std::size_t{1} << 30U;

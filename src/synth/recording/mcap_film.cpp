@@ -9,7 +9,7 @@ namespace plumbline::synth {
 
 namespace {
 
-/// Frames that are asked for one after another, rendered some at a time.
+/// Frames that are read in order, rendered in batches.
 class RenderedAhead final : public dataset::FrameSource {
  public:
   RenderedAhead(const SynthSource& source, const core::Executor& executor)

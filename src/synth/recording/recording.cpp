@@ -31,7 +31,7 @@ std::string depth_name(const dataset::PairInfo& info) {
   return fmt::format("depth/{:.6f}.png", info.depth_stamp);
 }
 
-/// With the stamps that the files have.
+/// Stamps as the files have them.
 dataset::PairInfo labelled(const SynthSource& source, std::size_t index) {
   dataset::PairInfo info = source.true_info(index);
   info.depth_stamp -= source.true_camera().depth_delay_s;

@@ -114,7 +114,7 @@ double Visibility::seen_share(std::size_t face) const {
   return static_cast<double>(seen) / static_cast<double>(count);
 }
 
-/// By face.
+/// For each face, 1 if a pixel shows it.
 static std::vector<char> faces_in(const View& view, std::size_t count) {
   std::vector<char> present(count, 0);
   for (const int id : view.ids) {

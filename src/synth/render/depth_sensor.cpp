@@ -52,7 +52,7 @@ void correlate(cv::Mat1f& tile, double sigma) {
   tile = (tile - mean[0]) / deviation[0];
 }
 
-/// A tile with a shift of its own.
+/// A tile with an independent shift.
 class Field {
  public:
   Field(const cv::Mat1f& tile, std::uint64_t key)
@@ -70,7 +70,7 @@ std::uint64_t frame_bits(const FrameKey& key, std::uint64_t purpose, std::int64_
   return mix(key.seed, purpose, static_cast<std::uint64_t>(frame));
 }
 
-/// Exact depth looked up where the matching window of the device really sat: borders become ragged.
+/// Exact depth looked up where the matching window of the device really was: borders become ragged.
 cv::Mat1f wander(const cv::Mat1f& exact, const Device& d, const NoiseTiles& tiles, const FrameKey& key,
                  cv::Mat1b& from) {
   const Field still_x(tiles.coarse, mix(key.seed, 11)), still_y(tiles.coarse, mix(key.seed, 12));

@@ -56,11 +56,9 @@ void fill_hidden(LightMap& map, std::vector<char>& hidden) {
         const auto at = static_cast<std::size_t>(j * map.columns + i);
         if (hidden[at] == 0) continue;
 
-        // Mean of the known neighbours.
+        // Mean of the known neighbours, at most eight.
         float sum = 0.0F;
         int count = 0;
-
-        // Eight neighbours, fewer at the border.
         for (int y = std::max(0, j - 1); y <= std::min(map.rows - 1, j + 1); ++y) {
           for (int x = std::max(0, i - 1); x <= std::min(map.columns - 1, i + 1); ++x) {
             const auto k = static_cast<std::size_t>(y * map.columns + x);

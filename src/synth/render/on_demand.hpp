@@ -42,7 +42,7 @@ class OnDemand {
   std::function<Value(std::size_t)> make_;
 };
 
-/// The same for values that take much memory: those that were not asked for longest are dropped, and made
+/// The same for values that take much memory: the least recently used ones are dropped, and made
 /// again if need be.
 template <typename Value>
 class Recent {
@@ -68,7 +68,7 @@ class Recent {
     if (!slot.value) bytes_ += size_(*made);
     slot.value = made;
 
-    // The longest unused values make room.
+    // The least recently used values make room.
     while (bytes_ > most_) {
       Slot* oldest = nullptr;
       for (Slot& other : slots_) {
