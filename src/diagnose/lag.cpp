@@ -202,6 +202,7 @@ std::vector<Sign> lag_signs(const Samples& samples) {
 
   const auto unexplained = [](double c) { return std::max(1e-3, 1.0 - c * c); };
 
+  // Depth that lags more and more.
   lags.size = drift;
   const double quick_lag = correlation(quick, begin, drift);
   if (grade(lags, {std::abs(drift) / kDrift_s, (quick_lag - quick_constant) / kQuickGain,
@@ -215,6 +216,7 @@ std::vector<Sign> lag_signs(const Samples& samples) {
         "record again with both streams stamped by one clock, or pair the images by the time of exposure";
   }
 
+  // Depth with a constant delay.
   late.size = delay;
   const double quick_late = correlation(quick, delay, 0.0), quick_none = correlation(quick, 0.0, 0.0);
   if (grade(late, {std::abs(delay) / kDelay_s, (quick_late - quick_none) / kQuickLate,

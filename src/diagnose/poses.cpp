@@ -126,6 +126,7 @@ Sign pose_sign(const Samples& samples, const geometry::Trajectory& poses) {
     }
   }
 
+  // The variant with the largest gain over most pairs.
   std::size_t best = 0;
   double gain = 1.0;
   for (std::size_t v = 1; v < variants.size(); ++v) {
@@ -135,6 +136,7 @@ Sign pose_sign(const Samples& samples, const geometry::Trajectory& poses) {
     if (here > gain) gain = here, best = v;
   }
 
+  // Certain only with a clear gain.
   sign.size = gain;
   if (!grade(sign, {gain / kCertainGain, best > 0 ? 2.0 : 0.0})) return sign;
   const double n = static_cast<double>(count[best]);

@@ -180,12 +180,14 @@ Sign registration_sign(const Samples& samples) {
   std::vector<Frame> frames;
   const std::vector<Sample> all = samples.samples();
 
+  // Two frames of each group.
   for (std::size_t k = 0; k < all.size(); ++k) {
     if (k % 4 != 0 && k % 4 != 3) continue;
     const Sample& sample = all[k];
     const cv::Size size(kWorkWidth, kWorkWidth * sample.gray.rows / sample.gray.cols);
     Frame frame{relative_gradient(sample.gray, 1, 0, size), relative_gradient(sample.gray, 0, 1, size), {}};
 
+    // Edges along both directions, thinned out.
     const double work_from_depth = static_cast<double>(kWorkWidth) / sample.depth.cols;
     add_steps(sample.depth, true, work_from_depth, frame.edges);
     add_steps(sample.depth, false, work_from_depth, frame.edges);
@@ -207,6 +209,7 @@ Sign registration_sign(const Samples& samples) {
   const double kept = std::max(a_now / std::max(a_by_b, 1e-3), b_now / std::max(b_by_a, 1e-3));
   const double off = std::min(distance(frames, a.best, {}), distance(frames, b.best, {}));
 
+  // Evidence: fit, gain, loss and size.
   const double px = static_cast<double>(all.front().gray.cols) / kWorkWidth;
   sign.size = off * px;
   if (!grade(sign, {std::min(a_by_b, b_by_a) / kFits, gain / kBetter, (1.0 - kept) / kLost, off / kOff}))

@@ -50,6 +50,7 @@ cv::Mat inverse_thumbnail(const cv::Mat& depth, cv::Size size) {
       float sum = 0.0F;
       int count = 0;
 
+      // Mean of the known depths in the block.
       for (int y = v * bv; y < std::min((v + 1) * bv, depth.rows); y += step) {
         const auto* row = depth.ptr<float>(y);
         for (int x = u * bu; x < std::min((u + 1) * bu, depth.cols); x += step) {

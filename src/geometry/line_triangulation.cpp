@@ -71,12 +71,14 @@ bool residuals_of(const LineView& view, const OrthonormalLine& line, Eigen::Vect
   const double norm_sq = l.head<2>().squaredNorm();
   if (!(norm_sq > 1e-16)) return false;
 
+  // Chain rule over the projected line.
   Eigen::Matrix<double, 3, 6> dl;
   dl << r, tr;
   const Eigen::Matrix<double, 3, 4> dl_dp = dl * orthonormal_jacobian(line);
   const double w = 1.0 / (std::sqrt(norm_sq) * view.sigma);
   const Eigen::Vector3d ends[2] = {view.start.homogeneous(), view.end.homogeneous()};
 
+  // Distance of each end from the line.
   for (int i = 0; i < 2; ++i) {
     const double dot = ends[i].dot(l);
     residual(i) = w * dot;

@@ -110,6 +110,7 @@ void BodyMotion::learn_wheels(const CameraStep& step) {
   const auto from = wheels_at(wheels_, whole.from), to = wheels_at(wheels_, whole.to);
   if (!from || !to) return;
 
+  // Calibrated again when there is enough new data.
   stretches_.push_back({to->inverse() * *from, whole.moved});
   path_m_ += path_m;
   if (path_m_ < kLeastWay_m || stretches_.size() < std::max(kFewest, next_wheels_)) return;

@@ -58,6 +58,7 @@ std::vector<std::size_t> bridge(const TurnRates& rates, const GyroCalibration& h
         geometry::log_so3(path[i].camera_from_world->rotation * (*turned * begin).transpose());
     if (off.norm() > kMostOff_rad) continue;
 
+    // The error grows evenly over the gap.
     for (std::size_t k = first + 1; k < i; ++k) {
       const auto so_far = rates.turned(path[first].stamp, path[k].stamp, how);
       if (!so_far) continue;

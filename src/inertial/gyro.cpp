@@ -196,6 +196,7 @@ std::optional<GyroCalibration> calibrate_gyro(const TurnRates& rates, const std:
 
   const double limit = std::max(kLeast, kOutlier * core::quantile(offs, 0.5, 0.0));
 
+  // Calibrated again without the worst steps.
   std::vector<CameraStep> good;
   for (std::size_t i = 0; i < steps.size(); ++i) {
     if (offs[i] <= limit) good.push_back(steps[i]);

@@ -63,6 +63,7 @@ WheelFit fit_wheels(const std::vector<WheelStretch>& stretches, const WheelCalib
   Normal information = Normal::Identity();
   double worth = 1.0;
 
+  // The expectation counts as an observation.
   for (int round = 0; round < kRounds; ++round) {
     information = sigma.cwiseInverse().cwiseAbs2().asDiagonal();
     Unknowns gradient = sigma.cwiseInverse().cwiseAbs2().asDiagonal() * moved;
@@ -70,6 +71,7 @@ WheelFit fit_wheels(const std::vector<WheelStretch>& stretches, const WheelCalib
     std::size_t agreeing = 0;
     double squares = 0.0;
 
+    // Cauchy cost of each stretch.
     for (const WheelStretch& stretch : stretches) {
       const Vector6d off = difference(stretch, fit.how);
       const double square = off.squaredNorm();
@@ -89,6 +91,7 @@ WheelFit fit_wheels(const std::vector<WheelStretch>& stretches, const WheelCalib
 
     const Unknowns step = -information.ldlt().solve(gradient);
 
+    // Noise is estimated from stretches that agree.
     moved += step;
     fit.how = changed(fit.how, step);
     fit.how.agreeing =

@@ -60,11 +60,13 @@ void find_ranges(const SvgChart& chart, Plot& plot) {
     y.include(line.y);
   }
 
+  // Dots count as well as lines.
   for (const SvgDots& dots : chart.dots) {
     x.include(dots.x);
     y.include(dots.y);
   }
 
+  // A background in metres is shown in full.
   if (chart.equal_aspect && chart.background) {
     x.include({chart.background->x.first, chart.background->x.second});
     y.include({chart.background->y.first, chart.background->y.second});

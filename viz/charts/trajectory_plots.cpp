@@ -208,6 +208,7 @@ void add_colored_path(const TrajectoryComparison& comparison, const std::vector<
     return std::min(kErrorClasses - 1, static_cast<std::size_t>(place));
   };
 
+  // One line per class, so that the legend explains it.
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   for (std::size_t k = 0; k < kErrorClasses; ++k) {
     const double most = static_cast<double>(k + 1) * step;
@@ -313,6 +314,7 @@ std::vector<SvgChart> pose_charts(const std::vector<TrajectoryComparison>& compa
   const Trajectory truth = shared_truth(comparisons);
   const auto truth_angles = angles_of(truth);
 
+  // Positions on the left, angles on the right.
   for (std::size_t k = 0; k < 3; ++k) {
     charts[2 * k].y_label = fmt::format("{} (m)", kAxisNames[k]);
     charts[2 * k + 1].y_label = fmt::format("{} (deg)", kAngleNames[k]);
@@ -325,6 +327,7 @@ std::vector<SvgChart> pose_charts(const std::vector<TrajectoryComparison>& compa
     chart.height_px = 300;
   }
 
+  // Estimates, with gaps.
   for (std::size_t i = 0; i < comparisons.size(); ++i) {
     const TrajectoryComparison& c = comparisons[i];
     const std::vector<bool> gaps = gaps_in(c.estimate);
@@ -341,6 +344,7 @@ std::vector<SvgChart> pose_charts(const std::vector<TrajectoryComparison>& compa
         start_beside(angles[k], truth_angles[k][index]);
       }
 
+      // Only the first chart names its curves.
       const std::string name = comparisons.size() == 1 ? "estimate" : c.name;
       charts[2 * k].lines.push_back({k == 0 ? name : "", estimate_kind(i), t,
                                      with_breaks(coordinate(c.estimate, static_cast<int>(k)), gaps)});
@@ -348,6 +352,7 @@ std::vector<SvgChart> pose_charts(const std::vector<TrajectoryComparison>& compa
     }
   }
 
+  // Truth on top of all estimates.
   const std::vector<double> t_truth = seconds(truth, start);
   for (std::size_t k = 0; k < 3 && !truth.empty(); ++k) {
     charts[2 * k].lines.push_back(

@@ -55,6 +55,7 @@ core::Result<ReportSummary> write_report(const ReportRequest& request, const cor
                                          core::Log& log) {
   const fs::path file = request.output.empty() ? request.result / "report.html" : request.output;
 
+  // Input and output are checked first.
   auto data = read_report_data(request.result);
   if (!data) return tl::unexpected<core::Error>(data.error());
   if (auto free = check_output(file, request.replace); !free)

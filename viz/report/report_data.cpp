@@ -90,6 +90,7 @@ void add_store(ReportData& data) {
     return;
   }
 
+  // A damaged map costs only its sections.
   const auto stored = maps::StoredRun::open_main(file);
   if (!stored) {
     data.missing.push_back(fmt::format("map.db {}: loops are not drawn", fault_of(file)));
@@ -203,11 +204,13 @@ core::Result<ReportData> read_report_data(const fs::path& folder) {
         "{}: the run was interrupted; finish it with plumbline map --resume, then report", folder.string()));
   }
 
+  // Without a summary there is no report.
   const auto result = maps::open_result(folder);
   if (!result) return tl::unexpected<core::Error>(result.error());
   auto summary = read_summary(result->summary());
   if (!summary) return tl::unexpected<core::Error>(summary.error());
 
+  // Name and axes of the result.
   ReportData data;
   data.folder = folder;
   const fs::path normal = fs::absolute(folder).lexically_normal();
@@ -215,6 +218,7 @@ core::Result<ReportData> read_report_data(const fs::path& folder) {
   data.summary = std::move(*summary);
   data.z_up = text_at(data.summary, "/frame/up") != "none";
 
+  // Paths before frames, which need them.
   add_paths(data);
   data.fused_afterwards = fused_afterwards(folder);
   add_frames(data);

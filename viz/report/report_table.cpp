@@ -43,6 +43,7 @@ core::Result<CsvTable> CsvTable::read(const std::filesystem::path& file) {
       table.cells_.push_back({begin, value.size()});
     }
 
+    // Every line must have all columns.
     if (cells != table.columns_.size()) {
       return core::input_error(fmt::format("{} is damaged: line {} has {} columns of {}", name, row + 1,
                                            cells, table.columns_.size()));

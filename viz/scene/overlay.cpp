@@ -152,6 +152,7 @@ void draw_axes(Painter& painter, const OverlayContent& content) {
   std::sort(order.begin(), order.end(),
             [&projection](int a, int b) { return projection.forward[a] > projection.forward[b]; });
 
+  // Each axis as the viewer sees it.
   for (const int axis : order) {
     const Eigen::Vector2d direction(projection.right[axis], projection.up[axis]);
     const Eigen::Vector2d tip = origin + kLength * s * direction;

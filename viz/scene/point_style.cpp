@@ -161,6 +161,7 @@ std::vector<std::uint32_t> visible_points(const Scene& scene, const Projection& 
   std::vector<std::uint32_t> facing;
   if (scene.cloud == nullptr) return all;
 
+  // Surroundings smooth noisy normals.
   const auto& cloud = *scene.cloud;
   all.reserve(cloud.size() / step + 1);
   std::optional<Surroundings> surroundings;
@@ -194,6 +195,7 @@ std::vector<std::uint32_t> nearest_per_cell(const Scene& scene, const std::vecto
   const auto cells = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
   std::vector<std::uint32_t> nearest(cells, kNone);
 
+  // Points outside the grid cannot be seen.
   std::vector<float> depth(cells, std::numeric_limits<float>::infinity());
   for (const auto i : points) {
     const Eigen::Vector3d at = projection.project(position((*scene.cloud)[i]));
@@ -223,6 +225,7 @@ double point_spacing(const Scene& scene, const std::vector<std::uint32_t>& point
   constexpr int kCells = 128;
   Eigen::Vector3d low, high;
 
+  // Extent without outliers, from a sample.
   const std::size_t step = std::max<std::size_t>(1, points.size() / 20000);
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
@@ -233,6 +236,7 @@ double point_spacing(const Scene& scene, const std::vector<std::uint32_t>& point
     high[axis] = core::quantile(values, 0.99, 0.0);
   }
 
+  // Occupied cubes measure the surface.
   const double side = std::max((high - low).maxCoeff() / kCells, 1e-4);
   std::vector<std::uint32_t> count(static_cast<std::size_t>(kCells) * kCells * kCells, 0);
   for (const auto i : points) {

@@ -76,6 +76,7 @@ void Raster::draw_line(const Eigen::Vector3d& from, const Eigen::Vector3d& to, d
       last = std::min(last, from.x() + b);
     };
 
+    // Sides, then ends of the rectangle.
     limit(unit.y(), -up * unit.x(), -half, half);
     limit(unit.x(), up * unit.y(), 0.0, length);
     for (int x = std::max(first_from(first), 0); x < std::min(first_from(last), depth_.cols); ++x) {

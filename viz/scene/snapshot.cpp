@@ -213,6 +213,7 @@ Drawn choose_what_to_draw(const Scene& scene, const SnapshotOptions& options) {
   large.width_px *= kSupersampling;
   large.height_px *= kSupersampling;
 
+  // View and projection come before the points.
   const SceneAxes axes = scene_axes(scene, large);
   Drawn drawn;
   drawn.content.scene = &scene;
@@ -313,6 +314,7 @@ class Renderer {
     renderer->SetBackgroundAlpha(0.0);
     window_->window()->AddRenderer(renderer);
 
+    // Lines and text by VTK's two-dimensional painter.
     vtkNew<Overlay> overlay;
     overlay->content = &drawn.content;
     overlay->band = &band;

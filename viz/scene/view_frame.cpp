@@ -176,6 +176,7 @@ void fit(Projection& projection, const std::vector<Eigen::Vector3d>& points,
       0.5 * ((x.low + x.high) * projection.right + (y.low + y.high) * projection.up +
              (z.low + z.high) * projection.forward);
 
+  // Distance of the eye, or scale of the plan.
   double distance = 2.0 * depth + 1.0;
   if (projection.orthographic) {
     fit_orthographic(projection, x, y, width_px);

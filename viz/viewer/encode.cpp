@@ -99,6 +99,7 @@ Grid on_grid(const Points& points, bool z_up, EncodedCloud& out) {
   for (int k = 0; k < 3; ++k)
     out.origin[static_cast<std::size_t>(k)] = std::floor(low[k] / out.step_m) * out.step_m;
 
+  // Codes sort points along the Morton curve.
   std::vector<Steps> steps(count);
   std::vector<std::pair<std::uint64_t, std::size_t>> sorted(count);
   for (std::size_t i = 0; i < count; ++i) {
@@ -112,6 +113,7 @@ Grid on_grid(const Points& points, bool z_up, EncodedCloud& out) {
   }
   std::sort(sorted.begin(), sorted.end());
 
+  // Steps and numbers in that order.
   Grid grid;
   grid.steps.reserve(count);
   for (const auto& [code, i] : sorted) {
@@ -284,11 +286,13 @@ EncodedCloud encode(const Points& points, bool z_up) {
                        static_cast<double>(std::max<std::size_t>(cells[edge], 1));
   out.spacing_m.back() = out.step_m * static_cast<double>(1U << edge) / std::sqrt(share);
 
+  // Chunks of one level.
   for (std::size_t l = 0; l < bits.size(); ++l) {
     std::vector<std::size_t> chosen;
     const auto flush = [&] {
       if (chosen.empty()) return;
 
+      // Extent of the chunk.
       Chunk chunk;
       chunk.level = static_cast<int>(l);
       chunk.count = chosen.size();
@@ -300,6 +304,7 @@ EncodedCloud encode(const Points& points, bool z_up) {
         }
       }
 
+      // Packed data of the chunk.
       chunk.points = packed_points(points, grid, chosen);
       if (!points.normals.empty()) chunk.normals = packed_normals(points, grid, chosen, z_up);
       for (const Layer& layer : points.layers) chunk.layers.push_back(packed_layer(layer, grid, chosen));
@@ -307,6 +312,7 @@ EncodedCloud encode(const Points& points, bool z_up) {
       chosen.clear();
     };
 
+    // Points in order, until a chunk is full.
     for (std::size_t i = 0; i < count; ++i) {
       if (level[i] != l) continue;
       chosen.push_back(i);

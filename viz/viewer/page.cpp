@@ -92,6 +92,7 @@ Json cloud_json(const Points& points, bool z_up, Pieces& pieces, Cost& cost) {
       cost.layers += pieces.base64.back().size();
     }
 
+    // The chunk with its extent.
     json["chunks"].push_back({{"level", chunk.level},
                               {"count", chunk.count},
                               {"low", chunk.low},
@@ -213,6 +214,7 @@ Json scene_json(const Scene& scene, Pieces& pieces, Cost& cost) {
     json["keyframes"].push_back(std::move(keyframe));
   }
 
+  // Lines, and arcs between matched keyframes.
   json["lines"] = segments_json(scene.lines, scene.z_up);
   json["arcs"] = Json::array();
   for (const Arc& arc : scene.arcs) {

@@ -143,6 +143,7 @@ class Draw {
     const double kind = rng_.uniform();
     Edit edit;
 
+    // Some things are removed.
     if (kind < 0.15) {
       edit.remove = name;
       return editor_.apply(edit).has_value();

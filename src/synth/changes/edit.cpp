@@ -223,6 +223,7 @@ std::optional<Editor::Slab> Editor::slab(const std::string& wall) const {
 
   const auto number = core::to_number(wall);
 
+  // Numbered walls, as plan.json has them.
   if (scene_.plan) {
     const Plan& plan = *scene_.plan;
     if (!number || *number < 0.0 || *number >= static_cast<double>(plan.walls.size())) return std::nullopt;
@@ -241,6 +242,7 @@ std::optional<Editor::Slab> Editor::slab(const std::string& wall) const {
     }
     std::size_t next = 0;
 
+    // Faces of the wall, and its storey.
     for (const PlanRoom& room : plan.rooms) {
       for (const PlanFace& face : room.faces) {
         const int object = walls[next++];
@@ -254,12 +256,13 @@ std::optional<Editor::Slab> Editor::slab(const std::string& wall) const {
       }
     }
 
+    // Openings belong to the wall.
     for (std::size_t i = 0; i < plan.openings.size(); ++i) {
       if (plan.openings[i].wall == index) slab.objects.push_back(openings[i]);
     }
   } else {
+    // Named walls of scene files.
     const int object = find(wall);
-
     if (object < 0 || scene_.objects[static_cast<std::size_t>(object)].type != "wall") return std::nullopt;
     const auto face = std::find_if(scene_.faces.begin(), scene_.faces.end(),
                                    [&](const Face& f) { return f.object == object; });
@@ -268,6 +271,7 @@ std::optional<Editor::Slab> Editor::slab(const std::string& wall) const {
     slab.half = 0.5 * std::abs(front.normal.dot(front.origin - back.origin));
     slab.origin = (front.origin - slab.half * front.normal).head<2>();
 
+    // Extent from all pieces of the wall.
     slab.objects = {object};
     for (const Face& f : scene_.faces) {
       if (f.object != object || std::abs(f.normal.dot(front.normal)) < 0.9) continue;

@@ -273,6 +273,7 @@ bool build_building(const SynthOptions& options, std::uint64_t seed, Scene& scen
          rectangle({0.0, 0.0}, 0.0, {well.x0 + 0.01, well.y0 + 0.01}, {well.x1 - 0.01, well.top()}), 0.0,
          frame.pitch, index});
 
+    // Furniture on the free floor.
     Ground ground(part);
     ground.block(part.things.back().outline, false);
     ground.recompute();
@@ -301,6 +302,7 @@ RobotPath plan_building_path(const Plan& plan, Route route, int robot, Rng& rng)
   std::vector<RobotPath> storeys;
   std::optional<Stairwell> well;
 
+  // Walks on each storey, which begin and end at the stairs.
   for (int k = 0; k < floors; ++k) {
     const Plan part = storey_of(plan, k);
     const PlanRoom* stairs = stairs_of(part);
@@ -315,6 +317,7 @@ RobotPath plan_building_path(const Plan& plan, Route route, int robot, Rng& rng)
   RobotPath path = storeys.front();
   path.waypoints.clear();
 
+  // A storey's walk, at the height of its floor.
   const auto tour = [&](int k) {
     for (Waypoint w : storeys[static_cast<std::size_t>(k)].waypoints) {
       const Vector3d lift(0.0, 0.0, plan.storeys[static_cast<std::size_t>(k)] + height - w.position.z());
@@ -324,6 +327,7 @@ RobotPath plan_building_path(const Plan& plan, Route route, int robot, Rng& rng)
     }
   };
 
+  // The lift takes the camera from storey to storey.
   const bool lift = stairs_of(plan)->kind == "lift";
   const auto ride = [&](int from, int to) {
     const auto z = [&](int storey) { return plan.storeys[static_cast<std::size_t>(storey)] + height; };
@@ -341,6 +345,7 @@ RobotPath plan_building_path(const Plan& plan, Route route, int robot, Rng& rng)
       return;
     }
 
+    // Storey by storey, up or down the stairs.
     for (int k = from; k != to; k += to > from ? 1 : -1) {
       std::vector<Vector3d> steps = well->climb();
       const double floor = plan.storeys[static_cast<std::size_t>(to > from ? k : k - 1)];

@@ -158,6 +158,7 @@ Subdivision draw_corridors(Rng& rng) {
   const double width = blocks * block + (blocks + 1) * corridor;
   Subdivision s({width, depth + (comb ? 1.0 : 2.0) * corridor}, rng.uniform(0.24, 0.4));
 
+  // Corridors along the blocks.
   int middle = 0;
   if (!comb) {
     middle = cut(s, 0, 1, depth + corridor, rng, false).value_or(0);
@@ -266,6 +267,7 @@ bool add_rooms(const Subdivision& cells, Rng& rng, Plan& plan) {
     const auto faces = cells.faces(cell);
     if (!faces) return false;
 
+    // The largest room without a kind.
     PlanRoom room;
     room.faces = *faces;
     room.kind = cell.kind;
@@ -281,7 +283,6 @@ bool add_rooms(const Subdivision& cells, Rng& rng, Plan& plan) {
     const auto outer = std::min_element(room.faces.begin(), room.faces.end(),
                                         [](const PlanFace& a, const PlanFace& b) { return a.wall < b.wall; });
     std::rotate(room.faces.begin(), outer, room.faces.end());
-
     plan.alike.push_back(static_cast<int>(i));
   }
 
@@ -293,12 +294,12 @@ bool add_rooms(const Subdivision& cells, Rng& rng, Plan& plan) {
 
     if (area < 4.0 && limited) return false;
     if (area > 60.0 && limited) return false;
-
     if (limited || room.kind == "alike") room.kind = room_kind(plan.kind, area, i == largest, rng);
 
     room.height = rng.chance(0.3) ? std::max(2.3, storey - rng.uniform(0.1, 0.4)) : storey;
     room.floor_material = floor_of(room.kind, rng);
 
+    // Materials, often the usual ones.
     static const std::vector<std::string> kWalls = {"plaster", "paint_blue", "paint_green", "paint_grey"};
     room.wall_material = rng.chance(0.55) ? usual : rng.pick(kWalls);
     room.accent_material = rng.chance(0.25)
@@ -306,6 +307,7 @@ bool add_rooms(const Subdivision& cells, Rng& rng, Plan& plan) {
                                : room.wall_material;
   }
 
+  // Rooms alike are copies but for their place.
   for (const int like : plan.alike) {
     PlanRoom &room = plan.rooms[static_cast<std::size_t>(like)],
              copy = plan.rooms[static_cast<std::size_t>(plan.alike.front())];

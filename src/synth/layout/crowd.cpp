@@ -267,6 +267,7 @@ bool add_people(int count, int seed, Scene& scene) {
 
   Rng rng(static_cast<std::uint64_t>(seed), 0x3a1c);
 
+  // The storey on which the path is at that point.
   for (int tries = 0; scene.walkers.size() < wanted && tries < 100; ++tries) {
     const double eyes = rng.pick(path).position.z();
     double floor = 0.0;
@@ -282,6 +283,7 @@ bool add_people(int count, int seed, Scene& scene) {
     const Vector2d other = stage.opposite(*home).value_or(*home);
     std::vector<Day> days;
 
+    // Two people who face each other at first.
     for (const Vector2d& at : {*home, other}) {
       if (at == *home && !days.empty()) break;
       const Vector2d& to = days.empty() ? other : *home;
@@ -289,6 +291,7 @@ bool add_people(int count, int seed, Scene& scene) {
       days.push_back(live(stage, at, yaw, share, rng.uniform(0.6, 1.1), rng));
     }
 
+    // They wait, so that both days have one length.
     for (Day& day : days) {
       if (scene.walkers.size() >= wanted) break;
       day.stand(std::max(days.front().seconds(), days.back().seconds()) - day.seconds());

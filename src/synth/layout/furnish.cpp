@@ -249,12 +249,13 @@ class Furnisher {
     const double length = (room().faces[face].from - room().faces[face].to).norm();
     const Vector2d half = 0.5 * item.size.head<2>();
 
+    // With its back to the wall.
     if (item.rule->place == "wall") {
       const double x = rng_.uniform(half.x() + 0.02, std::max(half.x() + 0.02, length - half.x() - 0.02));
       item.frame = placed(item.frame, {x, -half.y() - 0.03, 0.0}, {0.0, Vector3d::UnitZ()});
     } else {
+      // Anywhere in the room, mostly parallel to it.
       Eigen::AlignedBox2d box;
-
       for (const PlanFace& f : room().faces) box.extend(f.from);
       const double turn =
           rng_.integer(0, 3) * 0.5 * M_PI + (rng_.chance(0.3) ? rng_.uniform(-0.4, 0.4) : 0.0);

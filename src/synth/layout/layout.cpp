@@ -26,12 +26,14 @@ core::Result<std::optional<Scene>> try_layout(const std::string& kind, const Syn
   plan.kind = kind;
   plan.number = number;
 
+  // The scene can be made again from its name.
   Scene scene;
   scene.name = fmt::format("{}-{}", kind, number);
   scene.description = fmt::format("{} from the number {}", kind, number);
   scene.file = fmt::format("{}?layout={}", kind, number);
   scene.ambient = 0.35;
 
+  // A building makes its storeys by itself.
   const bool building = kind == "building";
   plan.copies = options.copies > 1;
   if (building) {
@@ -39,6 +41,7 @@ core::Result<std::optional<Scene>> try_layout(const std::string& kind, const Syn
   } else {
     Rng cells(seed, 1), rooms(seed, 2), openings(seed, 3), shell(seed, 4), things(seed, 5);
 
+    // Attempts with bad shapes or unreachable rooms fail.
     if (!add_rooms(draw_cells(kind, std::max(options.like, options.copies), options.hall, cells), rooms,
                    plan) ||
         !add_openings(openings, plan) || !make_alike(plan)) {
@@ -61,6 +64,7 @@ core::Result<std::optional<Scene>> try_layout(const std::string& kind, const Syn
     if (!building) ground = furnished_ground(*scene.plan, 0);
   }
 
+  // Every robot needs a path.
   for (int robot = 0; robot < options.robots; ++robot) {
     Rng walk(seed, 16 + static_cast<std::uint64_t>(robot));
     scene.robots.push_back(building ? plan_building_path(*scene.plan, options.path, robot, walk)

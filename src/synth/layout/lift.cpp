@@ -60,6 +60,7 @@ void build_lift_storey(const LiftShaft& shaft, int index, bool lowest, bool high
   solid({m + kHalf, y, 0.0}, {high.x(), shaft.door, top}, "paint_blue");
   solid({m - kHalf, y, kHead}, {m + kHalf, shaft.door, top}, "paint_blue");
 
+  // A sign and a lamp in the lobby.
   b.begin_object("sign", fmt::format("sign of lift {}", index), mark);
   add_panel(b, upright({m + kHalf + 0.45, shaft.door, 1.5}, M_PI), 0.5, 0.7, 0.02, "sign", "metal", false);
   b.begin_object("lamp", "", mark);
@@ -101,6 +102,7 @@ void add_lift(const LiftShaft& shaft, const std::vector<double>& storeys, Scene&
   add_panel(b, upright({m, back, 1.5}, M_PI), 0.7, 0.9, 0.02, "poster", "wood_dark", false);
   moves("lift", first, {0.0, 0.0, storeys.back()});
 
+  // Two leaves on every storey, built shut.
   for (std::size_t k = 0; k < storeys.size(); ++k) {
     for (const double side : {-1.0, 1.0}) {
       first = scene.faces.size();
@@ -153,6 +155,7 @@ void run_lift(const SynthOptions& options, const CameraPath& path, Scene& scene)
     inside.push_back(box.min().x() < at.x() && at.x() < box.max().x() && at.y() < box.max().y() &&
                      at.y() > box.min().y());
 
+    // The cab follows the camera inside.
     welcome.push_back((at - Vector2d(box.center().x(), box.max().y())).norm() < kWelcome);
     cab->shares.push_back(inside.back() != 0 ? floors.back() / storeys.back() : cab->shares.back());
   }

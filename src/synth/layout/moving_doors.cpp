@@ -83,6 +83,7 @@ double free_angle(const Scene& scene, std::size_t index, const PlanOpening& open
     if ((other.hinge.head<2>() - hinge).norm() < both) return 0.0;
   }
 
+  // In tenths of the leaf, angle by angle.
   for (int step = 0; step <= 20; ++step) {
     const double angle = step * kAngleStep;
     const Vector2d along = Eigen::Rotation2Dd(leaf.open_rad - angle) * reach;
@@ -192,6 +193,7 @@ std::vector<MovingDoor> drawers(const std::vector<std::vector<Eigen::Vector3d>>&
                  {Eigen::Vector3d(-0.2, -out - 0.08, -0.1), Eigen::Vector3d(0.2, 0.0, 0.1)}))
       continue;
 
+    // The drawer slides out of the desk.
     door.drawer = "drawer of " + scene.objects[static_cast<std::size_t>(object)].name;
     door.leaf = scene.leaves.size();
     door.opening = -1;
@@ -199,6 +201,7 @@ std::vector<MovingDoor> drawers(const std::vector<std::vector<Eigen::Vector3d>>&
     door.slide = -out * in;
     frame.translation += door.slide;
 
+    // Its box, which is hidden while it is shut.
     Scene box;
     Builder(box).box(frame, {-0.19, 0.01, -0.08}, {0.19, 0.34, 0.06}, {"cardboard"});
     for (Face& face : box.faces) face.object = object;
@@ -244,6 +247,7 @@ void choose_moving_doors(const SynthOptions& options, Scene& scene) {
     door.opening = static_cast<int>(i);
     if (o.back < 0 || door.leaf >= scene.leaves.size()) continue;
 
+    // From rest to nearly shut, or to wide open.
     const DoorLeaf& leaf = scene.leaves[door.leaf];
     const double most = free_angle(scene, door.leaf, o);
     door.rest_rad = leaf.open_rad;

@@ -188,6 +188,7 @@ bool connect_rooms(Rng& rng, const Plan& plan, Openings& openings) {
       if (crosses && used[i] == 0 && (best == stretches.size() || weights[i] < weights[best])) best = i;
     }
 
+    // The lightest edge that leaves the tree.
     if (best == stretches.size()) return false;
     used[best] = 1;
     if (!openings.connect(stretches[best], true)) continue;
@@ -245,6 +246,7 @@ bool add_openings(Rng& rng, Plan& plan) {
       const PlanWall& wall = plan.walls[static_cast<std::size_t>(face.wall)];
       if (!wall.outer) continue;
 
+      // The entrance is in the first wall long enough.
       const auto [from, to] = extent(wall, face);
       const Stretch stretch{face.wall, from, to, static_cast<int>(i), -1};
       if (!entrance && (kind == "corridor" || kind == "living") && to - from > 1.3) {
@@ -295,12 +297,14 @@ bool make_alike(Plan& plan) {
            wall != room(first).faces[1].wall && wall != room(first).faces[3].wall;
   };
 
+  // Openings that all rooms alike can have, and those elsewhere.
   std::vector<PlanOpening> kept;
   for (const PlanOpening& o : plan.openings) {
     const bool of_first = o.front == first || o.back == first;
     if (of_first ? common(o.wall) : !is_alike(o.front) && !is_alike(o.back)) kept.push_back(o);
   }
 
+  // Each other room gets copies.
   const std::size_t count = kept.size();
   for (const int other : plan.alike) {
     if (other == first) continue;

@@ -62,6 +62,7 @@ std::vector<std::vector<Vector2d>> convex_parts(const std::vector<Vector2d>& out
     }
     if (edge == n) continue;
 
+    // Two parts along the continued wall.
     std::vector<Vector2d> first = {at}, second = {at + nearest * d};
     for (std::size_t k = 1; k <= edge; ++k) first.push_back(outline[(i + k) % n]);
     first.push_back(at + nearest * d);
@@ -103,6 +104,7 @@ class Shell {
       for (std::vector<Vector2d> part : parts) {
         if (!floor) std::reverse(part.begin(), part.end());
 
+        // Textures continue over all parts.
         std::vector<Vector3d> corners;
         for (const Vector2d& p : part) corners.emplace_back(p.x(), p.y(), floor ? 0.0 : room.height);
         b_.polygon(corners, Vector3d::UnitX(), {floor ? room.floor_material : "ceiling"});
@@ -154,6 +156,7 @@ class Shell {
       b_.anchor(b_.scene().faces.back(), f.translation);
       if (z0 > 0.0 || z1 < 0.3) return;
 
+      // Skirting stands out and has an upper side.
       const double out = 0.008, u0 = x0 > 0.0 ? x0 : out, u1 = x1 < length ? x1 : length - out;
       quad(f, {{u0, -out, 0.0}, {u1, -out, 0.0}, {u1, -out, 0.07}, {u0, -out, 0.07}}, {"paint_white"});
       quad(f, {{u0, -out, 0.07}, {u1, -out, 0.07}, {u1, 0.0, 0.07}, {u0, 0.0, 0.07}}, {"paint_white"});
@@ -213,6 +216,7 @@ class Shell {
     part.height = z1 - z0;
     part.open_rad = o.open_rad;
 
+    // Coordinates of scene files begin in the wall's middle.
     const Rigid3 middle = placed(f, {0.0, 0.5 * o.depth, 0.0}, {0.0, Vector3d::UnitZ()});
     if (o.kind == OpeningKind::kWindow) add_glass(b_, middle, part);
     if (o.leaf == Leaf::kSliding) {

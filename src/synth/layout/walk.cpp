@@ -40,6 +40,7 @@ std::vector<Vector2d> stations(const PlanRoom& room, const Ground& ground, const
       return nearest + 2.0 * std::min(0.7, ground.clearance(p));
     };
 
+    // Enough are chosen if the rest is crowded.
     const auto best =
         std::max_element(candidates.begin(), candidates.end(),
                          [&](const Vector2d& a, const Vector2d& b) { return worth(a) < worth(b); });
@@ -84,6 +85,7 @@ std::vector<Vector2d> round_off(const std::vector<Vector2d>& corners, const Grou
           keep.begin(), keep.end(), [&](const PlanRoom* room) { return room->contains(corners[i]); });
   }
 
+  // Smoothed in rounds, with clearance kept.
   for (int round = 0; round < 12; ++round) {
     for (std::size_t i = 0; i < fine.size(); ++i) {
       const Vector2d &before = fine[(i + fine.size() - 1) % fine.size()],
@@ -303,6 +305,7 @@ RobotPath try_path(const Plan& plan, const Ground& ground, Route route, int robo
             return (a - way.back()).norm() < (b - way.back()).norm();
           });
 
+      // The way there, around obstacles.
       const std::vector<Vector2d> leg = ground.straight_way(way.back(), *nearest);
       if (leg.empty()) return path;
       way.insert(way.end(), leg.begin(), leg.end());

@@ -58,6 +58,7 @@ static void photograph(Canvas part, std::uint64_t seed) {
                        static_cast<int>(0.75 * size.height) - h);
     cv::rectangle(part, at, at + cv::Point(w, h), random_color(rng, 0.1, 0.8), -1);
 
+    // Six windows in each house.
     for (int k = 0; k < 6; ++k) {
       const cv::Point p = at + cv::Point(w * (1 + k % 2 * 3) / 6, h * (1 + k / 2 * 2) / 7);
       cv::rectangle(part, p, p + cv::Point(w / 6, h / 8), cv::Scalar::all(rng.uniform(0.02, 0.3)), -1);
@@ -88,6 +89,7 @@ Canvas draw_poster(const Material&, cv::Size size, std::uint64_t seed) {
     const int x = margin + c * (w - 2 * margin) / columns, width = (w - 2 * margin) / columns - margin / 2;
     int y = lines_from;
 
+    // Text lines, and a diagram now and then.
     while (y < h - margin) {
       if (rng.uniform() < 0.12 && y + h / 7 < h - margin) {
         const cv::Scalar color = random_color(rng, 0.05, 0.9);

@@ -77,6 +77,8 @@ Texture2d draw_texture(const Material& material, Texture texture, std::uint64_t 
   }
 
   if (texture == Texture::kWeak) fade(canvas, 0.2F);
+
+  // Mip levels down to one texel.
   Texture2d out;
   while (true) {
     out.levels.push_back(encode(canvas));

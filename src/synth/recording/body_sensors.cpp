@@ -95,6 +95,7 @@ std::vector<dataset::OdometryReading> odometry_readings(const SynthSource& sourc
     const geometry::Rigid3 from = source.motion(t, camera_from_body).world_from_frame,
                            to = source.motion(t + step, camera_from_body).world_from_frame;
 
+    // Motion in the body's frame, with slip and noise.
     const double heading = yaw_of(from), turned = std::remainder(yaw_of(to) - heading, 2.0 * M_PI);
     const Eigen::Rotation2Dd into_body(-(heading + 0.5 * turned));
     if (rng.chance(model.slip / 60.0 * step)) slips_until = t + 0.3;
@@ -102,6 +103,7 @@ std::vector<dataset::OdometryReading> odometry_readings(const SynthSource& sourc
     const Eigen::Vector2d moved = scale * wrong * (into_body * (to.translation - from.translation).head<2>());
     const double rotated = turn * wrong * turned;
 
+    // Dead reckoning of place and direction.
     const Eigen::Quaterniond q(Eigen::AngleAxisd(yaw, Vector3d::UnitZ()));
     readings.push_back(
         {t, {q, {place.x(), place.y(), 0.0}}, {moved.x() / step, moved.y() / step, 0.0}, rotated / step});

@@ -103,6 +103,7 @@ std::string describe_plan(const Plan& plan, const std::vector<geometry::Rigid3>&
   for (const PlanRoom& room : plan.rooms) rooms.push_back(describe_room(plan, room));
   for (const PlanOpening& o : plan.openings) openings.push_back(describe_opening(plan, o));
 
+  // Outlines of furniture.
   for (const PlanThing& thing : plan.things) {
     things.push_back({{"name", thing.name},
                       {"type", thing.type},
@@ -132,6 +133,7 @@ std::string describe_plan(const Plan& plan, const std::vector<geometry::Rigid3>&
   file["storeys"] = plan.storeys;
   file["alike"] = plan.alike;
 
+  // Seen shares are known only with a reference.
   if (coverage) file["seen"] = coverage->all;
   file["rooms"] = rooms;
   file["openings"] = openings;
@@ -158,6 +160,7 @@ std::string describe_changes(const Scene& scene) {
       continue;
     }
 
+    // Moved things, with what stands on them.
     changes.back().update({{"thing", c.thing},
                            {"with", c.with},
                            {"box_before_m", corners(c.before)},

@@ -83,6 +83,7 @@ Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs
   std::string color = "# timestamp filename\n", depth = color, pairs;
   geometry::Trajectory truth;
 
+  // Stamps and names of each pair.
   for (std::size_t i = 0; i < frames; ++i) {
     const dataset::PairInfo info = labelled(source, i);
     color += fmt::format("{:.6f} {}\n", info.stamp, color_name(info));
@@ -133,6 +134,7 @@ Result<std::size_t> write_pictures(const Job& job) {
     job.executor.parallel_for(
         count, [&](std::size_t i) { problems[i] = write_pair(job.source, done + i, job.folder); });
 
+    // The first problem ends the recording.
     for (const std::string& problem : problems) {
       if (!problem.empty()) return core::output_error(problem);
     }
@@ -296,6 +298,7 @@ PlanCoverage cover(const Scene& scene, const Visibility& visibility, const Refer
     sum.seen += area * visibility.seen_share(i);
   }
 
+  // Shares by area, in the order of the objects.
   for (std::size_t i = 0; i < sums.size(); ++i) {
     const double share = sums[i].area > 0.0 ? sums[i].seen / sums[i].area : 0.0;
     if (scene.objects[i].type == "wall") coverage.wall_faces.push_back(share);
@@ -356,6 +359,7 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
   }
   if (auto ok = write_plan(scene, *sources, coverage, output); !ok) return fail(ok.error());
 
+  // True changes, to judge those found.
   if (!options.changes.empty()) {
     if (auto ok = core::write_file(output / "changes.json", describe_changes(scene)); !ok)
       return fail(ok.error());
@@ -366,6 +370,7 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
   const std::string json = core::json_text(describe_world(scene, options, summary, *robots));
   if (auto ok = core::write_file(output / "scene.json", json); !ok) return fail(ok.error());
 
+  // A summary for the user.
   log.info(fmt::format("{}: {} frames of {} robot(s) in {:.1f} s, {} reference samples ({} visible)",
                        scene.name, summary.frames, summary.robots, summary.wall_s, summary.reference_samples,
                        summary.reference_visible));

@@ -59,7 +59,6 @@ std::vector<PlySample> sample_face(const World& world, const Visibility& visibil
 
   // The middle of the grid's cells, whole cells over the face, so that no edge is favoured.
   const int nu = std::max(1, static_cast<int>(std::lround((b.max().x() - b.min().x()) / spacing)));
-
   const int nv = std::max(1, static_cast<int>(std::lround((b.max().y() - b.min().y()) / spacing)));
   const double du = (b.max().x() - b.min().x()) / nu, dv = (b.max().y() - b.min().y()) / nv;
   std::vector<signed char> outside(static_cast<std::size_t>((nu / 16 + 1) * (nv / 16 + 1)), -1);
@@ -68,6 +67,7 @@ std::vector<PlySample> sample_face(const World& world, const Visibility& visibil
       const Vector2d uv(b.min().x() + (i + 0.5) * du, b.min().y() + (j + 0.5) * dv);
       if (!face.contains(uv, 1e-9)) continue;
 
+      // Surface inside solids or outside the world is left out.
       const Vector3d p = face.at(uv.x(), uv.y()), before = p + 0.002 * face.normal;
       const bool visible = visibility.seen(index, uv.x(), uv.y());
       if (!visible) {
@@ -136,6 +136,7 @@ void Visibility::mark(const geometry::Rigid3& world_from_camera, const sensor::P
     const Vector2d pixel = camera.project(c);
     if (!camera.contains(pixel, 1.0)) return false;
 
+    // The sensor must get enough light back.
     const Vector3d ray = (p - world_from_camera.translation).normalized();
     if (!measures(world_->options.sensor, *world_->materials[index], {camera.width, camera.height},
                   {pixel.x(), pixel.y()}, c.z(), std::abs(ray.dot(world_->scene.faces[index].normal)))) {
@@ -157,6 +158,7 @@ void Visibility::mark(const geometry::Rigid3& world_from_camera, const sensor::P
         std::atomic<std::uint8_t>& flag = flags_[g.at(i, j)];
         if (flag.load(std::memory_order_relaxed) != 0) continue;
 
+        // The block's middle decides first.
         const double ua = g.u0 + i * block_, va = g.v0 + j * block_;
         const double ub = std::min(ua + block_, b.max().x()), vb = std::min(va + block_, b.max().y());
         const Vector3d middle = face.at(0.5 * (ua + ub), 0.5 * (va + vb));
@@ -227,6 +229,7 @@ core::Result<ReferenceCounts> write_reference(const std::filesystem::path& file,
               static_cast<std::streamsize>(part.size() * sizeof(PlySample)));
   }
 
+  // Errors of the disk appear at the latest now.
   out.flush();
   if (!out)
     return core::output_error(

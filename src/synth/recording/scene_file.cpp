@@ -68,6 +68,7 @@ nlohmann::json describe_options(const Scene& scene, const SynthOptions& options)
   given.declare(table);
   usual.declare(defaults);
 
+  // Options that differ from their defaults.
   for (const core::OptionSpec& spec : table.specs()) {
     if (spec.key == "reference_spacing" || json.contains(spec.key) ||
         table.value(spec.key) == defaults.value(spec.key))

@@ -23,6 +23,7 @@ sensor::Camera make_camera(Sensor sensor, int width, int height, double fps) {
   // Colour cameras 69 degrees across.
   const bool wide = sensor == Sensor::kRealsense || sensor == Sensor::kStereo || sensor == Sensor::kPhone;
 
+  // Intrinsics of the devices, scaled to the image.
   camera.color = {width,
                   height,
                   (wide ? 462.0 : 535.4) * s,
@@ -30,6 +31,7 @@ sensor::Camera make_camera(Sensor sensor, int width, int height, double fps) {
                   0.5 * width + 0.1 * s,
                   0.5 * height + 7.6 * s};
 
+  // Other devices differ in focal length and centre.
   if (sensor == Sensor::kIdeal) camera.color.fx = camera.color.fy = 525.0 * s;
   if (sensor == Sensor::kIdeal) camera.color.cx = 0.5 * (width - 1);
   if (sensor != Sensor::kKinect && sensor != Sensor::kStructured) camera.color.cy = 0.5 * (height - 1);
@@ -95,6 +97,7 @@ core::Result<void> SynthSource::Impl::check_way() const {
         world->scene
             .objects[static_cast<std::size_t>(world->scene.faces[static_cast<std::size_t>(hit.face)].object)];
 
+    // The message names waypoints and the object.
     const core::ConfigMark& mark = robot_path.waypoints[k].mark;
     return core::usage_error(
         fmt::format("{}:{}: the path of {} {} {} (line {}) between waypoints {} and {}, at ({:.2f}, {:.2f}, "
@@ -114,6 +117,7 @@ core::Result<void> SynthSource::Impl::check_way() const {
   Vector3d here = first;
   const double once = std::min(end, 2.0 * path->duration() + 60.0);  // later rounds repeat the first
 
+  // Small steps follow the curve of the path.
   constexpr double kStep = 0.02;  // s
   const auto steps = static_cast<int>(once / kStep);
   for (int i = 1; i <= steps; ++i) {

@@ -68,6 +68,7 @@ cv::Mat2f SynthSource::Impl::flow(const View& view, const Stamps& at, double ext
                    : world->motion(*mover, now + dt) * (world->motion(*mover, now).inverse() * p);
       };
 
+      // Motion in the image, with the blur of events.
       const Eigen::Vector2d d = view.camera.project(later * at_time(0.5 * exposure)) -
                                 view.camera.project(sooner * at_time(-0.5 * exposure));
       out(j, i) = {static_cast<float>(d.x() + extra_px * std::cos(angle)),
@@ -117,6 +118,7 @@ cv::Mat3b SynthSource::Impl::color(const Stamps& at) const {
   if (event(EventKind::kCover, at.color) != 0.0) exposure.gain *= 0.004F;
   if (event(EventKind::kWhiteout, at.color) != 0.0) exposure.gain *= 60.0F;
 
+  // Row by row with a rolling shutter.
   cv::Mat3b image = world->options.readout_s > 0.0
                         ? rolling(at, exposure)
                         : shade(*world, view, {exposure.gain * row_gain(at, at.color), exposure.vignette});

@@ -32,6 +32,7 @@ core::Result<Parsed> parse_url(const std::string& url) {
   map.kind = core::ConfigNode::Kind::kMap;
   map.mark.file = url;
 
+  // Pairs of key and value.
   std::string rest = question == std::string::npos ? "" : body.substr(question + 1);
   while (!rest.empty()) {
     const auto amp = rest.find('&');

@@ -144,6 +144,7 @@ FaultyDepth faulty_depth(const World& world, const View& view, const DepthFaults
       float& z = depth(y, x);
       if (!(z > 0.0F)) continue;
 
+      // All factors multiply, the offset adds to inverse depth.
       const double radius2 = ((x - cx) * (x - cx) + (y - cy) * (y - cy)) / (cx * cx + cy * cy);
       const double length = view.camera.unproject(x, y, 1.0).norm();
       const double inverse = 1.0 / static_cast<double>(z) + faults.offset;

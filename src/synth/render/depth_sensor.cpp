@@ -314,6 +314,7 @@ NoiseTiles make_noise(Sensor sensor, std::uint64_t seed) {
   NoiseTiles tiles;
   if (sensor == Sensor::kIdeal) return tiles;
 
+  // Correlation lengths of the devices.
   tiles.fine = white_tile(mix(seed, 1));
   correlate(tiles.fine, sensor == Sensor::kRealsense || sensor == Sensor::kStereo ? 1.8 : 1.1);
   tiles.medium = white_tile(mix(seed, 7));
@@ -422,6 +423,7 @@ void smear(const cv::Mat3b& image, const cv::Rect& cell, const cv::Vec2f& f, int
       }
     }
 
+    // Back to bytes, rounded.
     auto* q = out.ptr<std::uint8_t>(y) + 3 * cell.x;
     for (int i = 0; i < 3 * cell.width; ++i)
       q[i] = static_cast<std::uint8_t>(std::min(255, (sum[i] * divide + 32768) >> 16));

@@ -36,6 +36,7 @@ FaceView view_face(const World& world, std::size_t index, const sensor::Pinhole&
     return Vector3d(w.x() / k.fx, w.y() / k.fy, w.z() - w.x() * k.cx / k.fx - w.y() * k.cy / k.fy);
   };
 
+  // Inverse depth and texture coordinates are linear forms.
   const double h = n.dot(origin);
   const Vector3d c = through_pixels(n) / (std::abs(h) > 1e-9 ? h : 1e-9);
   const TexelScale scale = texel_scale(world, index);

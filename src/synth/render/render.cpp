@@ -98,6 +98,7 @@ Footprint footprint(const Texture2d& texture, const FaceView& f, float x, float 
   out.coarse = &texture.levels[coarse];
   out.blend = out.probes > 1 ? 0.0F : level - static_cast<float>(fine);
 
+  // Factors from level 0 to the levels read.
   const auto width = static_cast<float>(texture.levels[0].width),
              height = static_cast<float>(texture.levels[0].height);
   out.fine_x = static_cast<float>(out.fine->width) / width;

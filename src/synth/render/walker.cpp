@@ -44,11 +44,13 @@ std::array<geometry::Rigid3, kParts> part_frames(const FigurePose& pose, bool ca
     return Eigen::AngleAxisd(angle, axis).toRotationMatrix();
   };
 
+  // The trunk defines the frame of all joints.
   std::array<geometry::Rigid3, kParts> out;
   const geometry::Rigid3 trunk = upright(pose.hip, pose.yaw);
   out[kTrunk] = trunk;
   double ahead[2];
 
+  // The leg from hip to foot.
   for (const int side : {0, 1}) {
     const double y = side == 0 ? 1.0 : -1.0;
     const Vector3d joint(0.0, 0.09 * y, 0.0);
@@ -174,6 +176,7 @@ MovingFaces::MovingFaces(const World& world, const View& view, double t) : world
                         static_cast<int>(std::clamp(pixel.y(), -1e6, 1e6)) - 2, 5, 5);
       };
 
+      // Outline clipped at the near plane.
       Vector3d before =
           camera_from_world * (motion * face.at(face.polygon.back().x(), face.polygon.back().y()));
       for (const Eigen::Vector2d& uv : face.polygon) {

@@ -70,6 +70,7 @@ void World::build_bvh() {
   rtcSetSceneFlags(bvh_, RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(bvh_, RTC_BUILD_QUALITY_HIGH);
 
+  // Sizes of the buffers.
   std::size_t vertices = 0, triangles = 0;
   for (std::size_t i = 0; i < fixed_faces; ++i) {
     if (gone[i] != 0) continue;
@@ -77,6 +78,7 @@ void World::build_bvh() {
     triangles += scene.faces[i].polygon.size() - 2;
   }
 
+  // Embree owns the buffers.
   RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* v = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
                                                         RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertices));
@@ -84,6 +86,7 @@ void World::build_bvh() {
       geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), triangles));
   if (v == nullptr || t == nullptr) throw std::bad_alloc();
 
+  // Corners of each face.
   unsigned base = 0;
   for (std::size_t i = 0; i < fixed_faces; ++i) {
     if (gone[i] != 0) continue;
@@ -93,6 +96,7 @@ void World::build_bvh() {
       for (int k = 0; k < 3; ++k) *v++ = static_cast<float>(p[k]);
     }
 
+    // Convex polygons are fans of triangles.
     const auto corners = static_cast<unsigned>(face.polygon.size());
     for (unsigned k = 1; k + 1 < corners; ++k) {
       *t++ = base;
@@ -104,6 +108,7 @@ void World::build_bvh() {
     base += corners;
   }
 
+  // The geometry belongs to the tree.
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(bvh_, geometry);
   rtcReleaseGeometry(geometry);
@@ -155,6 +160,7 @@ Hit World::cast(const Vector3d& origin, const Vector3d& direction, double far) c
   Hit hit;
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return hit;
 
+  // The face, and the side that was hit.
   hit.face = face_of_triangle_[query.hit.primID];
   hit.distance = static_cast<double>(query.ray.tfar);
   hit.front = scene.faces[static_cast<std::size_t>(hit.face)].normal.dot(direction) < 0.0;
@@ -215,6 +221,7 @@ void World::prepare_textures() {
     double aspect;
   };
 
+  // One texture per material, print and shape.
   std::vector<Job> jobs;
   std::map<std::tuple<std::string, int, int>, int> known;
   texture_of.resize(scene.faces.size());
@@ -231,12 +238,14 @@ void World::prepare_textures() {
                                      static_cast<int>(std::lround(16.0 * std::log2(std::max(aspect, 1e-3)))));
     const auto [entry, fresh] = known.emplace(key, static_cast<int>(jobs.size()));
 
+    // The seed depends on the name, not on the order.
     if (fresh) {
       std::uint64_t name_hash = 0;
       for (const char letter : face.material) name_hash = mix(name_hash, static_cast<std::uint64_t>(letter));
       jobs.push_back({materials[i], mix(seed, name_hash, static_cast<std::uint64_t>(variant)), aspect});
     }
 
+    // Tiled textures begin anywhere.
     texture_of[i] = entry->second;
     tile_m.push_back(worn(*materials[i], options.texture).tile_m);
     if (tiled) {

@@ -52,6 +52,7 @@ void Builder::polygon(const std::vector<Vector3d>& corners, const Vector3d& u_hi
   face.v_axis = face.normal.cross(face.u_axis);
   face.origin = corners[0];
 
+  // Corners in the plane of the face.
   for (const Vector3d& corner : corners) {
     const Vector3d d = corner - face.origin;
     face.polygon.emplace_back(d.dot(face.u_axis), d.dot(face.v_axis));
@@ -65,6 +66,7 @@ void Builder::polygon(const std::vector<Vector3d>& corners, const Vector3d& u_hi
   face.material = skin.material;
   face.seed = skin.seed >= 0 ? skin.seed : seed_;
 
+  // Prints cover the whole face.
   if (skin.stretched) {
     face.stretch_u = bounds.sizes().x();
     face.stretch_v = bounds.sizes().y();

@@ -174,6 +174,7 @@ void read_wall(const Context& c) {
   r.material("material", wall.material).material("skirting", wall.skirting);
   if (!r.read({"doors", "windows"})) return;
 
+  // A wall needs a length.
   wall.from = {from[0], from[1]};
   wall.to = {to[0], to[1]};
   if ((wall.to - wall.from).norm() < 0.01) {
@@ -198,11 +199,13 @@ void read_panels(const Context& c) {
   wall.height = 2.0;
   wall.material = "cloth";
 
+  // Settings of all panels.
   ObjectReader r(c.node, c.path, c.problems);
   r.length("height", wall.height, 0.01, 50.0).length("bottom", wall.bottom, -50.0, 50.0);
   r.length("thickness", wall.thickness, 0.001, 5.0).material("material", wall.material);
   if (!r.read({"points"})) return;
 
+  // At least two corners.
   const ConfigNode* list = c.node.find("points");
   if (list == nullptr || list->kind != ConfigNode::Kind::kSequence || list->items.size() < 2) {
     r.problem(c.node.mark, "needs 'points', a list of at least two [x, y]");
@@ -297,6 +300,7 @@ void read_panel(const Context& c) {
   std::string material = c.type == "whiteboard" ? "whiteboard" : c.type == "sign" ? "sign" : "poster";
   if (c.type == "picture") material = "picture";
 
+  // Settings, with usual values by type.
   ObjectReader r(c.node, c.path, c.problems);
   r.point("at", at, 3).size("size", size, 2).angle("yaw", yaw).length("thickness", thickness, 0.001, 0.5);
   r.material("material", material).count("seed", seed, 0, 1 << 20);
@@ -326,6 +330,7 @@ void read_furniture(const Context& c) {
       {"sofa", "sofa"}, {"cabinet", "wood_dark"}, {"chair", "fabric"},
   };
 
+  // Settings of all furniture.
   std::vector<double> at, size = kSizes.count(c.type) != 0 ? kSizes.at(c.type) : std::vector<double>{};
   double yaw = 0.0;
   bool books = true;
@@ -334,6 +339,7 @@ void read_furniture(const Context& c) {
   ObjectReader r(c.node, c.path, c.problems);
   r.point("at", at, 0).angle("yaw", yaw).material("material", material);
 
+  // Settings of some types.
   if (!size.empty()) r.size("size", size, 3);
   if (c.type == "shelf") r.flag("books", books);
   if (c.type == "cabinet") r.count("doors", doors, 1, 8);
@@ -389,6 +395,7 @@ void read_thing(const Context& c) {
   }
   if (!begin(c, r)) return;
 
+  // The thing itself, by its type.
   const geometry::Rigid3 frame = upright(to3(at), yaw);
   if (c.type == "monitor") add_monitor(c.builder, frame, width, stand);
   if (c.type == "plant") add_plant(c.builder, frame, height);
@@ -426,6 +433,7 @@ void read_objects(const ConfigNode& list, Builder& builder, ConfigProblems& prob
   std::vector<std::string> types;
   for (const auto& [type, unused] : object_readers()) types.push_back(type);
 
+  // Each item is a type with its settings.
   for (std::size_t i = 0; i < list.items.size(); ++i) {
     const ConfigNode& item = list.items[i];
     const std::string path = fmt::format("objects[{}]", i);
@@ -434,6 +442,7 @@ void read_objects(const ConfigNode& list, Builder& builder, ConfigProblems& prob
       continue;
     }
 
+    // Unknown types, with the most similar one.
     const auto& [type, body] = item.entries.front();
     const auto reader = object_readers().find(type);
     if (reader == object_readers().end()) {

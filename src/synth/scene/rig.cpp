@@ -26,6 +26,7 @@ core::Result<std::vector<geometry::Rigid3>> read_rig(const SynthOptions& options
     return tl::unexpected<core::Error>(core::to_error(problems));
   }
 
+  // Place and direction of each camera.
   for (const core::ConfigNode& item : list->items) {
     std::vector<double> at(3, 0.0);
     double yaw = 0.0, pitch = 0.0, roll = 0.0;

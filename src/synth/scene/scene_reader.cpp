@@ -52,6 +52,7 @@ void read_robot(const ConfigNode& node, std::size_t index, RobotPath& robot, Con
   double height = 1.3, pitch = 0.0;
   robot.name = fmt::format("robot{}", index);
 
+  // Settings of the robot.
   core::OptionTable table;
   table.text("name", robot.name, "Name");
   table.boolean("closed", robot.closed, "Close the path from its last waypoint to the first");
@@ -66,6 +67,7 @@ void read_robot(const ConfigNode& node, std::size_t index, RobotPath& robot, Con
     return;
   }
 
+  // A path of two waypoints or more.
   table.set_all(node, path, problems, {"path"});
   const ConfigNode* list = node.find("path");
   if (list == nullptr || list->kind != ConfigNode::Kind::kSequence || list->items.size() < 2) {
@@ -73,6 +75,7 @@ void read_robot(const ConfigNode& node, std::size_t index, RobotPath& robot, Con
     return;
   }
 
+  // Waypoints that cannot be read are reported.
   for (std::size_t i = 0; i < list->items.size(); ++i) {
     Waypoint w;
     if (!read_waypoint(list->items[i], fmt::format("{}.path[{}]", path, i), height, pitch, w, problems))
@@ -170,6 +173,7 @@ void read_root(const ConfigNode& root, Scene& scene, ConfigProblems& problems) {
     problems.push_back({root.mark, "objects", "a scene needs a list of objects"});
   }
 
+  // Robots and people, after the things around them.
   read_robots(root, scene, problems);
   if (const ConfigNode* walkers = root.find("walkers")) read_walkers(*walkers, scene, problems);
   if (problems.empty() && scene.faces.empty())

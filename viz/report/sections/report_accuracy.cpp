@@ -154,6 +154,7 @@ std::string saved_html(const ReportData& data) {
                    {">RPE per second (mm)", "{/rpe/per_second/translation_m/rmse:1mm}"},
                    {">tracked (%)", "{/tracked_percent:1}"}});
 
+  // Columns of cloud evaluations.
   JsonTable clouds({{"evaluation of a cloud", ""},
                     {">accuracy median (mm)", "{/accuracy_mm/median:1}"},
                     {">rmse (mm)", "{/accuracy_mm/rmse:1}"},
@@ -208,6 +209,7 @@ core::Result<void> add_truth(const fs::path& truth, ReportData& data) {
       return core::input_error(fmt::format("--truth {}: {}", file.string(), report.error().message));
     }
 
+    // Kept for the joint alignment.
     path.accuracy = std::move(*report);
     name_truth(path.robot, file, data);
     pairs.emplace_back(path.poses, std::move(*poses));

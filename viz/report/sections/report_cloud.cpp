@@ -106,6 +106,7 @@ std::optional<CloudExtent> measure_extent(const cloud::Cloud& cloud) {
     values[2].push_back(p.z);
   }
 
+  // Number of outer points on each side.
   const std::size_t count = values[0].size();
   if (count == 0) return std::nullopt;
   CloudExtent extent;
@@ -155,6 +156,7 @@ std::optional<viz::SvgBackground> plan_of(const ReportData& data) {
   const auto png = dataset::encode_png(picture, kSmall);
   if (!png) return std::nullopt;
 
+  // The image becomes part of the page.
   viz::SvgBackground plan;
   plan.data_uri =
       "data:image/png;base64," + base64({reinterpret_cast<const char*>(png->data()), png->size()});
@@ -171,6 +173,7 @@ std::string cloud_html(const ReportData& data) {
   add_left_out(data, "/cloud/left_out", "Left out of what keyframes measured, points", facts);
   add_left_out(data, "/cloud/left_out_of_map", "Left out of the merged cloud, points", facts);
 
+  // Sizes, with and without outliers.
   std::string out;
   if (const std::optional<CloudExtent>& extent = data.extent) {
     facts.emplace_back("File", data.cloud_file);
@@ -178,6 +181,7 @@ std::string cloud_html(const ReportData& data) {
     facts.emplace_back("Bounding box without the outer 0.5 % of each side", box_text(extent->central_size()));
     facts.emplace_back("Coordinates", range_text(extent->low, extent->high));
 
+    // Uncertainty, if the cloud has it.
     if (number_at(data.summary, "/cloud/sigma_m/median") > 0.0) {
       facts.emplace_back("Standard deviation along the normal, of poses and depth",
                          filled(data.summary,

@@ -41,11 +41,13 @@ std::vector<TimedColumn> slowest_stages(const CsvTable& table) {
         name.size() > 3 && name.substr(name.size() - 3) == "_ms" && name.find('.') == std::string::npos;
     if (!stage) continue;
 
+    // Only stages that take noticeable time.
     TimedColumn column{name.substr(0, name.size() - 3), values_of(table, c), 0.0};
     column.median = core::quantile(column.values, 0.5);
     if (core::quantile(column.values, 0.95) >= kWorthShowing_ms) columns.push_back(std::move(column));
   }
 
+  // The slowest ones first.
   const auto slower = [](const TimedColumn& a, const TimedColumn& b) { return a.median > b.median; };
   std::stable_sort(columns.begin(), columns.end(), slower);
   if (columns.size() > kMost) columns.resize(kMost);
@@ -59,6 +61,7 @@ std::string time_charts(const ReportData& data) {
   const double start_s = core::quantile(time_s, 0.0);
   for (double& t : time_s) t -= start_s;
 
+  // One curve per stage.
   viz::SvgChart chart;
   chart.title = "Milliseconds of each stage per frame";
   chart.y_label = "a frame (ms)";
@@ -183,6 +186,7 @@ std::string files_html(const ReportData& data, const fs::path& left_out) {
   std::vector<std::pair<std::string, double>> files;
   double all = 0.0;
 
+  // All files of the result, with their sizes.
   std::error_code ec;
   for (fs::recursive_directory_iterator it(data.folder, ec), end; !ec && it != end; it.increment(ec)) {
     std::error_code problem;

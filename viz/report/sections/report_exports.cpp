@@ -59,6 +59,7 @@ std::string exports_html(const ReportData& data) {
   std::sort(files.begin(), files.end());
   if (files.empty()) return {};
 
+  // A link for each file.
   std::string pictures;
   std::string links;
   for (const fs::path& file : files) {

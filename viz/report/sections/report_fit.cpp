@@ -25,6 +25,7 @@ MapFit fit_of(const maps::Map& map, const sensor::Pinhole& camera,
     return own == cameras.end() ? camera : own->second;
   };
 
+  // Points that several keyframes observed.
   std::vector<double> points, depths, lines;
   for (const core::PointId id : map.point_ids()) {
     const maps::MapPoint& point = map.point(id);
@@ -50,6 +51,7 @@ MapFit fit_of(const maps::Map& map, const sensor::Pinhole& camera,
     const maps::MapLine& line = map.line(id);
     if (line.observations.size() < 2) continue;
 
+    // Lines in the same way.
     for (const maps::Observation& o : line.observations) {
       const auto& segment =
           map.keyframe(o.keyframe).features->lines[static_cast<std::size_t>(o.feature)].segment;

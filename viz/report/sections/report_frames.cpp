@@ -40,6 +40,7 @@ void sort_by_robot(ReportData& data) {
   const std::size_t robot_column = table.column("robot");
   const bool several = robot_column < table.columns().size();
 
+  // Rows by robot.
   std::map<std::string, ReportFrames> robots;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const std::string robot(table.text(row, robot_column));
@@ -55,7 +56,6 @@ void sort_by_robot(ReportData& data) {
 
   // If robots did not meet, the result holds only one of them: the one with the stamps of its poses.
   std::size_t most = 0;
-
   for (const ReportFrames& frames : data.frames) {
     std::size_t own = 0;
     for (const std::size_t row : frames.rows) {

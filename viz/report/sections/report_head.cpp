@@ -48,6 +48,7 @@ std::string verdict_html(const ReportData& data) {
                       "wrong changes nothing but lengths.");
   }
 
+  // Limits that hold for any verdict.
   if (flag_at(s, "/stopped")) {
     out += banner("warn", "Stopped early",
                   fmt::format("The run was ended after {} of {} frames; this is what was mapped by then.",
@@ -57,6 +58,7 @@ std::string verdict_html(const ReportData& data) {
 
   if (!data.kind.empty()) out += banner("warn", "Only map.db", "The " + data.kind + ".");
 
+  // Parts that could not be read.
   if (!data.missing.empty()) {
     std::string list;
     for (const std::string& line : data.missing) list += "<li>" + viz::markup_text(line) + "</li>";
@@ -179,6 +181,7 @@ std::string lost_html(const ReportData& data) {
   const bool several = data.frames.size() > 1;
   if (several) columns += "|robot";
 
+  // One row per stretch.
   HtmlTable table(columns);
   for (std::size_t i = 0; i < std::min(kMost, stretches.size()); ++i) {
     const LostStretch& l = stretches[i];
@@ -187,6 +190,7 @@ std::string lost_html(const ReportData& data) {
                number(l.lost), number(l.unreadable), number_text(l.gap_m, 3), l.robot});
   }
 
+  // The rest is only counted.
   std::string out = table.html();
   if (stretches.size() > kMost)
     out += note(fmt::format("The {} longest of {} stretches.", kMost, stretches.size()));

@@ -70,6 +70,7 @@ std::string merge_evidence(const Json& m) {
                               "chance), {/alternative_overlay/seen_through} seen through"));
   }
 
+  // Time and accuracy of the merge.
   if (number_at(m, "/time_s") >= 0.0)
     facts.emplace_back("Certain after", filled(m, "{/time_s:1 s of the recordings}"));
   if (!list_at(m, "/sigma").empty()) {
@@ -174,6 +175,7 @@ std::string closings_html(const ReportData& data) {
     if (refused.rows() < kMostRows) refused.row(trial);
   }
 
+  // Counts first, then disputes and closed loops.
   std::string out =
       paragraph(filled(data.summary,
                        "{/loops/candidates} candidates, {/loops/verified} verified; loops moved the map "
@@ -189,6 +191,7 @@ std::string closings_html(const ReportData& data) {
     out += folded(fmt::format("Each refused candidate ({})", refused.rows()), refused.html());
   if (list.empty()) return out;
 
+  // Terms of the tables.
   return out +
          note(
              "Found: landmarks of the match that are where they should be. Overlap and contradiction: of the "
@@ -213,6 +216,7 @@ std::string merges_html(const ReportData& data) {
   const Json& list = list_at(data.summary, "/merges");
   if (list.empty()) return {};
 
+  // One row per merge.
   JsonTable overview({{"maps", ""},
                       {"", ""},
                       {">look alike", "{/candidates}"},
@@ -279,6 +283,7 @@ std::string refinement_html(const ReportData& data) {
        {"Keyframes moved", "{/refine/mean_shift_m:1 mm} on average, {/refine/max_shift_m:1 mm} at most"}});
   facts.emplace_back("Standard deviation of keyframes relative to the first", sigma_text(s));
 
+  // Accuracy and adjustment of the whole.
   std::string out = facts_html(facts);
   if (number_at(s, "/refine/sigma_position_m/median") > 0.0) out += note(kSigmaNote);
   out += adjustment_html(s);

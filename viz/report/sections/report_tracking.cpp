@@ -61,6 +61,7 @@ class RobotCharts {
                          number_text(core::quantile(column(std::string(name) + "_rms"), 0.5), 2, "σ"));
     };
 
+    // Frames and their states.
     table.robot(frames_.robot);
     table.value("Frames", count(frames_.rows.size()));
     table.value("Tracked", share(tracked));
@@ -236,6 +237,7 @@ static std::string components_html(const ReportData& data) {
   const double dropped = number_at(data.summary, "/components/dropped");
   if (table.rows() == 0 && !(dropped > 0.0)) return {};
 
+  // Maps, and frames that have none.
   std::string out = "<h3>Maps begun when tracking was lost</h3>\n";
   if (table.rows() > 0) out += table.html();
   if (dropped > 0.0)

@@ -54,6 +54,7 @@ core::Result<std::string> viewer_html(ReportData& data, const ReportRequest& req
   view->scene.name = data.name;
   view->scene.clouds.front().name = data.name;
 
+  // The viewer, with notes for its use.
   const std::string placing =
       view->scene.placing.empty() ? std::string() : paragraph(view->scene.placing + ".");
   return placing +
