@@ -31,7 +31,7 @@ std::string depth_name(const dataset::PairInfo& info) {
   return fmt::format("depth/{:.6f}.png", info.depth_stamp);
 }
 
-/// With the stamps that the files have.
+/// Stamps as the files have them.
 dataset::PairInfo labelled(const SynthSource& source, std::size_t index) {
   dataset::PairInfo info = source.true_info(index);
   info.depth_stamp -= source.true_camera().depth_delay_s;
@@ -83,6 +83,7 @@ Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs
   std::string color = "# timestamp filename\n", depth = color, pairs;
   geometry::Trajectory truth;
 
+  // Stamps and names of each pair.
   for (std::size_t i = 0; i < frames; ++i) {
     const dataset::PairInfo info = labelled(source, i);
     color += fmt::format("{:.6f} {}\n", info.stamp, color_name(info));
@@ -90,10 +91,13 @@ Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs
     pairs += fmt::format("{:.6f} {} {:.6f} {}\n", info.stamp, color_name(info), info.depth_stamp,
                          depth_name(info));
     truth.push_back({info.stamp, source.world_from_camera(info.stamp)});
+
+    // Truth at both stamps of a pair.
     const double depth_taken = source.true_info(i).depth_stamp;
     if (depth_taken != info.stamp) truth.push_back({depth_taken, source.world_from_camera(depth_taken)});
   }
 
+  // Depth may be older than colour.
   std::sort(truth.begin(), truth.end(),
             [](const geometry::StampedPose& a, const geometry::StampedPose& b) { return a.stamp < b.stamp; });
   if (pictures) {
@@ -130,6 +134,7 @@ Result<std::size_t> write_pictures(const Job& job) {
     job.executor.parallel_for(
         count, [&](std::size_t i) { problems[i] = write_pair(job.source, done + i, job.folder); });
 
+    // The first problem ends the recording.
     for (const std::string& problem : problems) {
       if (!problem.empty()) return core::output_error(problem);
     }
@@ -142,17 +147,21 @@ Result<std::size_t> write_pictures(const Job& job) {
 
 /// Truth beside the first `frames` frames.
 Result<void> write_truth(const Job& job, std::size_t frames) {
+  // Share of moving pixels, once per round.
   const std::size_t round = std::min(frames, job.source.round());
   std::vector<Result<double>> shares(round, 0.0);
   job.executor.parallel_for(round, [&](std::size_t i) {
     shares[i] = write_moving(job.source, i, job.folder, job.options.moving_masks);
   });
+
+  // One failed frame fails all.
   std::vector<double> moving;
   for (const auto& share : shares) {
     if (!share) return tl::unexpected<core::Error>(share.error());
     moving.push_back(*share);
   }
 
+  // Later rounds repeat the first one.
   const auto mask = [&](std::size_t i) {
     return job.folder / "moving" / color_name(labelled(job.source, i)).substr(4);
   };
@@ -162,6 +171,7 @@ Result<void> write_truth(const Job& job, std::size_t frames) {
     if (auto done = repeat_file(mask(i % round), mask(i)); !done) return done;
   }
 
+  // Lists, truth and, if there are any, events.
   auto ok = write_lists(job.source, frames, job.folder, !job.options.mcap);
   if (ok) ok = core::write_file(job.folder / "truth.csv", describe_truth(job.source, moving));
   if (ok && !(job.source.events().empty() && job.source.swings().empty()))
@@ -181,6 +191,7 @@ Result<std::size_t> write_frames(const Job& job, core::Log& log) {
   }
   if (!ok) return tl::unexpected<core::Error>(ok.error());
 
+  // Sensors of the body.
   dataset::BodyReadings body;
   body.body_from_camera = job.source.body_from_camera();
   if (!job.options.imu.empty()) body.imu = imu_readings(job.source, *imu_model(job.options.imu), job.seed);
@@ -191,10 +202,13 @@ Result<std::size_t> write_frames(const Job& job, core::Log& log) {
     ok = core::write_file(job.folder / "odometry.csv", describe_odometry(body.odometry));
   if (!ok) return tl::unexpected<core::Error>(ok.error());
 
+  // Pictures, in one file or in many.
   auto done = job.options.mcap ? write_mcap(job.source, job.folder / "recording.mcap", &body, job.executor,
                                             job.stop, job.progress, log)
                                : write_pictures(job);
   if (!done) return done;
+
+  // Truth of the frames written, even if stopped.
   if (ok = write_truth(job, *done); !ok) return tl::unexpected<core::Error>(ok.error());
   return done;
 }
@@ -202,6 +216,7 @@ Result<std::size_t> write_frames(const Job& job, core::Log& log) {
 std::string folder_name(int robot) { return fmt::format("robot{}", robot); }
 
 Result<void> check_free(const fs::path& output) {
+  // An earlier recording must not be overwritten.
   for (const fs::path& file : {output / "scene.json", output / folder_name(0)}) {
     if (fs::exists(file)) {
       return core::output_error(
@@ -211,6 +226,7 @@ Result<void> check_free(const fs::path& output) {
   return {};
 }
 
+/// One source per recording.
 Result<std::vector<std::unique_ptr<SynthSource>>> open_all(const std::shared_ptr<const World>& world) {
   std::vector<std::unique_ptr<SynthSource>> sources;
   for (int i = 0; i < recordings(world->options); ++i) {
@@ -236,6 +252,7 @@ Result<nlohmann::json> write_robots(const std::vector<std::unique_ptr<SynthSourc
     const std::string folder = folder_name(static_cast<int>(i));
     const std::size_t before = summary.frames;
 
+    // Progress counts the frames of all recordings.
     const Job job{*sources[i],
                   options,
                   output / folder,
@@ -281,6 +298,7 @@ PlanCoverage cover(const Scene& scene, const Visibility& visibility, const Refer
     sum.seen += area * visibility.seen_share(i);
   }
 
+  // Shares by area, in the order of the objects.
   for (std::size_t i = 0; i < sums.size(); ++i) {
     const double share = sums[i].area > 0.0 ? sums[i].seen / sums[i].area : 0.0;
     if (scene.objects[i].type == "wall") coverage.wall_faces.push_back(share);
@@ -305,6 +323,8 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
                                       const core::Executor& executor, const core::StopToken& stop,
                                       core::Log& log, const Progress& progress) {
   const auto fail = [](const core::Error& e) { return tl::unexpected<core::Error>(e); };
+
+  // Refused before any work is done.
   if (auto ok = check_free(output); !ok) return fail(ok.error());
   auto world = build_world(scene, options, executor);
   if (!world) return fail(world.error());
@@ -313,12 +333,14 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
   if (auto ok = check_free(output); !ok) return fail(ok.error());  // building the world took its time
   if (auto ok = core::make_folder(output); !ok) return fail(ok.error());
 
+  // All recordings, then the surfaces that they saw.
   WriteSummary summary;
   const auto robots = write_robots(*sources, scene, options, output, executor, stop, log, progress, summary);
   if (!robots) return fail(robots.error());
   summary.reference_spacing_m =
       options.reference_spacing > 0.0 ? options.reference_spacing : default_spacing(scene);
 
+  // A stopped run has no reference.
   std::optional<PlanCoverage> coverage;
   if (!stop.stop_requested()) {
     Visibility visibility(*world, summary.reference_spacing_m);
@@ -337,15 +359,18 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
   }
   if (auto ok = write_plan(scene, *sources, coverage, output); !ok) return fail(ok.error());
 
+  // True changes, to judge those found.
   if (!options.changes.empty()) {
     if (auto ok = core::write_file(output / "changes.json", describe_changes(scene)); !ok)
       return fail(ok.error());
   }
 
+  // Written last, with the state of the run.
   summary.stopped = stop.stop_requested();
   const std::string json = core::json_text(describe_world(scene, options, summary, *robots));
   if (auto ok = core::write_file(output / "scene.json", json); !ok) return fail(ok.error());
 
+  // A summary for the user.
   log.info(fmt::format("{}: {} frames of {} robot(s) in {:.1f} s, {} reference samples ({} visible)",
                        scene.name, summary.frames, summary.robots, summary.wall_s, summary.reference_samples,
                        summary.reference_visible));
