@@ -18,6 +18,7 @@ bool is_between_keyframes(const FramePose& frame, const Map& map) {
   return frame.tracked && map.has_keyframe(frame.reference) && !became_keyframe(frame, map);
 }
 
+/// Tracked frames in the map's frame, through the current poses of their reference keyframes.
 geometry::Trajectory trajectory(const std::vector<FramePose>& frames, const Map& map) {
   geometry::Trajectory result;
   for (const FramePose& frame : frames) {
@@ -44,10 +45,15 @@ PathCheck check_path(const std::vector<FramePose>& frames, const Map& map) {
 
   for (const FramePose& frame : frames) {
     if (!frame.reference.valid()) continue;
+
+    // Only consecutive tracked frames are compared
     const FramePose* before = std::exchange(last[frame.reference.robot], &frame);
     if (before == nullptr || !before->tracked || !frame.tracked || !frame.camera_from_previous) continue;
+
+    // Within one reference the step cannot tear
     if (before->reference == frame.reference) continue;
 
+    // The step as optimised, against the step as tracked
     const geometry::Rigid3 step =
         frame.camera_from_reference * map.camera_from_world(frame.reference) *
         (before->camera_from_reference * map.camera_from_world(before->reference)).inverse();
@@ -62,6 +68,7 @@ PathCheck check_path(const std::vector<FramePose>& frames, const Map& map) {
   return check;
 }
 
+/// The keyframes' path; `robot` selects those of one robot.
 geometry::Trajectory trajectory(const std::vector<KeyframePose>& keyframes,
                                 std::optional<std::int32_t> robot) {
   geometry::Trajectory result;
@@ -81,6 +88,7 @@ std::vector<KeyframePose> keyframe_poses(const Map& map) {
   return poses;
 }
 
+/// Poses and their names; untracked frames count too.
 MapPoses poses_of(const Map& map, const std::vector<FramePose>& frames) {
   MapPoses poses{trajectory(frames, map), {}, keyframe_poses(map)};
   std::map<std::int32_t, std::int32_t> numbers;  // by robot
@@ -98,6 +106,7 @@ std::map<std::int32_t, geometry::Trajectory> by_robot(const MapPoses& map) {
   return paths;
 }
 
+/// Changes the reference frame of all poses.
 void move(MapPoses& poses, const geometry::Rigid3& frame_from_map) {
   for (geometry::StampedPose& pose : poses.trajectory) {
     pose.world_from_camera = frame_from_map * pose.world_from_camera;

@@ -36,6 +36,7 @@ std::string samples_header(std::size_t count) {
 
 }  // namespace
 
+/// Fixed-size records of single precision behind a NumPy header.
 core::Result<void> write_pose_samples(const std::filesystem::path& file,
                                       const std::vector<KeyframeSamples>& samples) {
   core::OutputFile out(file);
@@ -63,6 +64,8 @@ core::Result<std::vector<KeyframeSamples>> read_pose_samples(const std::filesyst
     }
     all.push_back(one);
   }
+
+  // A truncated record or a wrong count
   if (in.gcount() != 0 || header != samples_header(all.size())) {
     return core::input_error(
         fmt::format("{}: is damaged, or no file of {}; map again", file.string(), kPoseSamplesFile));

@@ -41,6 +41,7 @@ void check_id(const core::KeyframeId& id) {
   demand(!id.valid() || (id.robot <= kMostRobots && id.index < kMostNumbers), "an id is out of range");
 }
 
+/// The next free ids must be within the range of ids.
 template <typename Ids>
 void check_next(const Ids& ids) {
   constexpr std::int64_t kMost = kMostNumbers * kLandmarksPerPage;
@@ -52,6 +53,7 @@ void check_next(const Ids& ids) {
 
 void check(std::monostate /*none*/) {}
 
+/// A keyframe's numbers must be finite and within an image.
 void check(const std::shared_ptr<const Keyframe>& keyframe) {
   demand(std::isfinite(keyframe->stamp) && std::isfinite(keyframe->turn_rate), "its stamp is not finite");
   check_id(keyframe->reference);
@@ -68,6 +70,7 @@ void check(const KeyframeState& state) {
   check_id(state.parent);
 }
 
+/// Landmarks of a page are in order and finite.
 template <typename Landmark>
 void check_landmarks(const std::vector<Landmark>& landmarks) {
   std::int32_t last = -1;
@@ -88,6 +91,7 @@ void check_landmarks(const std::vector<Landmark>& landmarks) {
 void check(const Page<MapPoint>& points) { check_landmarks(*points); }
 void check(const Page<MapLine>& lines) { check_landmarks(*lines); }
 
+/// Only tracked frames have a pose.
 void check(const Page<FramePose>& frames) {
   for (const FramePose& frame : *frames) {
     demand(std::isfinite(frame.stamp), "a frame's stamp is not finite");
@@ -109,6 +113,7 @@ void check_edge(const KeyframeEdge& edge) {
 
 void check(const EdgeRow& row) { check_edge(row.edge); }
 
+/// Both cameras and all distortion terms.
 void check(const sensor::Camera& camera) {
   check(camera.color);
   if (camera.depth) check(*camera.depth);
@@ -126,6 +131,7 @@ void check(const MapRow& row) {
   for (const LoopEdge& loop : row.loops) check_edge(loop);
 }
 
+/// A refined camera's numbers must be finite and in range.
 void check(const CameraEstimate& estimate) {
   check(estimate.found);
   demand(estimate.asked_at >= -1 && estimate.used_from >= 0, "a camera's estimate is out of range");
@@ -136,16 +142,17 @@ void check(const CameraEstimate& estimate) {
 }
 
 void check_header(const std::string& key, const Bytes& bytes, std::vector<RobotInfo>& robots) {
+  // A small packet must not unpack to gigabytes
   const auto plain = [&](std::size_t most) { return unpack(bytes.data(), bytes.size(), most); };
+
+  // Robots are kept: keyframes refer to their cameras
   if (key == "robots") {
     robots = decode<std::vector<RobotInfo>>(plain(kMostSmall));
     demand(!robots.empty(), "there is no robot");
-
     for (const RobotInfo& robot : robots) {
       demand(robot.number >= 0 && robot.number <= kMostRobots, "an id is out of range");
       check(robot.camera);
     }
-
   } else if (key == "cameras") {
     for (const CameraVersions& of : decode<std::vector<CameraVersions>>(plain(kMostSmall))) {
       for (const CameraVersion& version : of.versions) {
@@ -153,7 +160,6 @@ void check_header(const std::string& key, const Bytes& bytes, std::vector<RobotI
         demand(version.first_keyframe >= 0 && version.first_frame >= 0, "a camera's version is out of range");
       }
     }
-
   } else if (key == "estimates") {
     const auto estimates = decode<CameraEstimates>(plain(kMostSmall));
     for (const auto& estimate : estimates.each) check(estimate.second);
@@ -161,7 +167,6 @@ void check_header(const std::string& key, const Bytes& bytes, std::vector<RobotI
       for (const double one : {s.fx, s.centre, s.distortion, s.readout_s, s.depth_slope, s.depth_delay_s})
         demand(one >= 0.0 && one < 1e9, "a camera's standard deviation is out of range");
     }
-
   } else if (key == "result") {
     check(decode<ResultFrame>(plain(kMostSmall)).output_from_map);
   } else {
@@ -177,6 +182,7 @@ void check_cloud(const Bytes& bytes) {
 
 }  // namespace
 
+/// Keys are short texts, or numbers within their table's range.
 void check_name(const RowName& name) {
   const RowTable& table = kRowTables[name.table];
   if (table.named) {

@@ -8,15 +8,16 @@ namespace {
 
 template <typename Io>
 void row_fields(Io& io, StoreRow& row) {
+  // Table and removal share a byte
   constexpr std::uint8_t kRemoved = 0x80;
   auto head = static_cast<std::uint8_t>(row.name.table | (row.removed ? kRemoved : 0));
   io(head);
-
   if constexpr (Io::kReads) {
     row.removed = (head & kRemoved) != 0;
     row.name.table = head & ~std::size_t{kRemoved};
   }
 
+  // Named rows have a text key, others two numbers
   io.check(row.name.table < std::size(kRowTables), "there is no such table");
   if (kRowTables[row.name.table].named) {
     io(row.name.key);
@@ -25,10 +26,10 @@ void row_fields(Io& io, StoreRow& row) {
   }
   if (row.removed) return;
 
+  // Type and content; a removed row has none
   auto type = static_cast<std::uint8_t>(row.type);
   io(type);
   row.type = type;
-
   if (type == SQLITE_INTEGER) {
     io(row.integer);
   } else if (type == SQLITE_TEXT) {
@@ -54,6 +55,8 @@ void consume_rows(Bytes& bytes, const std::function<void(const StoreRow&, std::s
   std::size_t done = 0;
   while (bytes.size() - done >= kLength) {
     const auto length = decode<std::uint32_t>(Bytes(at(done), at(done + kLength)));
+
+    // The limit guards against damaged lengths
     if (length > kMostRowBytes) throw BadBytes("a row is too large");
     const std::size_t end = done + kLength + length;
     if (bytes.size() < end) break;
@@ -65,6 +68,8 @@ void consume_rows(Bytes& bytes, const std::function<void(const StoreRow&, std::s
     row(next, end - done);
     done = end;
   }
+
+  // The next chunk continues the incomplete row
   bytes.erase(bytes.begin(), at(done));
 }
 
