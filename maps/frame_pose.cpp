@@ -60,6 +60,8 @@ PathCheck check_path(const std::vector<FramePose>& frames, const Map& map) {
     const geometry::Rigid3 off = step * frame.camera_from_previous->inverse();
     const PathStep seen{frame.stamp, before->reference, frame.reference, off.translation.norm(),
                         geometry::rotation_angle(off.rotation)};
+
+    // A deviation beyond noise is a tear
     check.largest_m = std::max(check.largest_m, seen.off_m);
     check.largest_rad = std::max(check.largest_rad, seen.off_rad);
     if (beyond_noise(seen.off_m, seen.off_rad, frame.step_sigma_m)) check.tears.push_back(seen);

@@ -45,6 +45,8 @@ core::Result<void> write_lines_ply(const std::filesystem::path& file,
         color[axis].push_back(rgb[axis]);
       }
     }
+
+    // An edge joins the two vertices
     ply.edges.push_back({first, first + 1});
     ply.edge_colors.push_back(rgb);
   }

@@ -56,6 +56,8 @@ class PartsCollector {
       point.position = world_from_map * point.position;
       point.view_direction = world_from_map.rotation * point.view_direction;
       point.normal = world_from_map.rotation * point.normal;
+
+      // Observations refer to renamed keyframes
       point.angle_keyframe = renamed(point.angle_keyframe, to);
       point.observations = renamed(std::move(point.observations), to);
       parts_.points.push_back(std::move(point));

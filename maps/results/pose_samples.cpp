@@ -57,6 +57,8 @@ core::Result<std::vector<KeyframeSamples>> read_pose_samples(const std::filesyst
   std::string header(kHeader, '\0');
   in.read(header.data(), kHeader);
   std::vector<KeyframeSamples> all;
+
+  // Records until the end of the file
   for (SamplesRecord record; in.read(reinterpret_cast<char*>(&record), sizeof record);) {
     KeyframeSamples one{{record.robot, record.keyframe}, {}};
     for (std::size_t s = 0; s < one.in_camera.size(); ++s) {

@@ -112,10 +112,14 @@ core::Result<void> StoredMaps::arrange(const core::Executor& executor) {
   std::set<std::string> robot_names;
   std::int32_t number = 0;
   std::vector<RobotNumbers> numbers(parts_.size());
+
+  // Names are unique, numbers consecutive
   for (std::size_t p = 0; p < parts_.size(); ++p) {
     StoredPart& part = parts_[p];
     RobotNumbers& to = numbers[p];
     part.name = free_name(part.name, part_names);
+
+    // Old numbers map to new ones
     for (RobotInfo& robot : part.robots) {
       to[robot.number] = number;
       robot.number = number++;

@@ -153,6 +153,7 @@ void check_header(const std::string& key, const Bytes& bytes, std::vector<RobotI
       demand(robot.number >= 0 && robot.number <= kMostRobots, "an id is out of range");
       check(robot.camera);
     }
+
   } else if (key == "cameras") {
     for (const CameraVersions& of : decode<std::vector<CameraVersions>>(plain(kMostSmall))) {
       for (const CameraVersion& version : of.versions) {
@@ -160,6 +161,7 @@ void check_header(const std::string& key, const Bytes& bytes, std::vector<RobotI
         demand(version.first_keyframe >= 0 && version.first_frame >= 0, "a camera's version is out of range");
       }
     }
+
   } else if (key == "estimates") {
     const auto estimates = decode<CameraEstimates>(plain(kMostSmall));
     for (const auto& estimate : estimates.each) check(estimate.second);
@@ -167,6 +169,7 @@ void check_header(const std::string& key, const Bytes& bytes, std::vector<RobotI
       for (const double one : {s.fx, s.centre, s.distortion, s.readout_s, s.depth_slope, s.depth_delay_s})
         demand(one >= 0.0 && one < 1e9, "a camera's standard deviation is out of range");
     }
+
   } else if (key == "result") {
     check(decode<ResultFrame>(plain(kMostSmall)).output_from_map);
   } else {

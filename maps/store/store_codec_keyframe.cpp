@@ -112,6 +112,7 @@ void thumbnail(Io& io, cv::Mat& image) {
     for (int y = 0; y < rows; ++y)
       values.insert(values.end(), image.ptr<float>(y), image.ptr<float>(y) + width);
     io.planes(values.data(), values.size());
+
   } else {
     const std::size_t size = static_cast<std::size_t>(rows) * width;
     io.need(size * sizeof(float));

@@ -157,10 +157,12 @@ void StoreReplica::Impl::apply_row(const StoreRow& row) {
       if (table.named) throw BadBytes("rows of this table stay");
       check_name(row.name);
       changes.push_back({row.name, std::nullopt});
+
     } else {
       if (row.type != type_of(table, row.name.key)) throw BadBytes("its content has the wrong type");
       changes.push_back({row.name, check_row(row.name, row.data, robots)});
     }
+
   } catch (const BadBytes& bad) {
     throw BadBytes(where + ": " + bad.what());
   }

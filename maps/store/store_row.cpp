@@ -30,6 +30,8 @@ void row_fields(Io& io, StoreRow& row) {
   auto type = static_cast<std::uint8_t>(row.type);
   io(type);
   row.type = type;
+
+  // Only bytes may be long
   if (type == SQLITE_INTEGER) {
     io(row.integer);
   } else if (type == SQLITE_TEXT) {
@@ -60,6 +62,8 @@ void consume_rows(Bytes& bytes, const std::function<void(const StoreRow&, std::s
     if (length > kMostRowBytes) throw BadBytes("a row is too large");
     const std::size_t end = done + kLength + length;
     if (bytes.size() < end) break;
+
+    // The row without its length
     const Bytes content(at(done + kLength), at(end));
     ByteReader from(content);
     StoreRow next;

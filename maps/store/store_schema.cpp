@@ -138,13 +138,15 @@ void check_store(Database& database) {
                        "is an SQLite file, but not a map store; give the map.db of a result folder");
   }
 
-  // Newer and older formats are not converted
+  // Newer formats need a newer program
   const std::int64_t format = database.number("PRAGMA user_version");
   if (format > kStoreFormat) {
     throw StoreFailure(core::ErrorKind::kInput, "is a map store of format " + std::to_string(format) +
                                                     ", this program reads up to " +
                                                     std::to_string(kStoreFormat) + "; use a newer Plumbline");
   }
+
+  // Older formats are not converted
   if (format < 1) throw BadBytes("its format number is wrong");
   if (format < kStoreFormat) {
     throw StoreFailure(core::ErrorKind::kInput, "is a map store of format " + std::to_string(format) +
@@ -184,6 +186,8 @@ StoreHeader read_header(Database& database) {
   if (estimates.step()) {
     const auto all = decode<CameraEstimates>(estimates.unpacked(0));
     for (const auto& of : all.each) each(of.first, [&of](RobotInfo& robot) { robot.estimate = of.second; });
+
+    // Standard deviations hold for all versions
     for (const auto& of : all.told) {
       each(of.first, [&of](RobotInfo& robot) {
         robot.camera.sigma = of.second;

@@ -88,6 +88,7 @@ auto guarded(const std::filesystem::path& file, core::ErrorKind kind, const Acti
     } else {
       return action();
     }
+
   } catch (const StoreFailure& failure) {
     return fail(failure.kind, failure.what());
   } catch (const SQLite::Exception& error) {
