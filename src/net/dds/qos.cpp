@@ -55,6 +55,7 @@ Qos chunk_qos(int most_ms) {
 }
 
 core::Result<Qos> participant_qos(const NetworkOptions& options) {
+  // Without keys nothing is secured
   Qos qos = new_qos();
   if (options.security.empty()) return qos;
 
@@ -64,6 +65,7 @@ core::Result<Qos> participant_qos(const NetworkOptions& options) {
     dds_qset_prop(qos.get(), name, value.c_str());
   };
 
+  // Identity and permissions, as files
   for (const auto& [name, file] : {std::pair{"dds.sec.auth.identity_ca", kAuthorityFile},
                                    {"dds.sec.auth.identity_certificate", kCertificateFile},
                                    {"dds.sec.auth.private_key", kKeyFile},
@@ -71,6 +73,7 @@ core::Result<Qos> participant_qos(const NetworkOptions& options) {
                                    {"dds.sec.access.permissions_ca", kAuthorityFile},
                                    {"dds.sec.access.governance", kGovernanceFile},
                                    {"dds.sec.access.permissions", kPermissionsFile}}) {
+    // A missing file is named in the message
     if (!std::filesystem::exists(folder / file, ec)) {
       return core::usage_error(fmt::format(
           "--security: {} is missing; give a robot's or the hub's folder made by plumbline keys create",
@@ -79,6 +82,7 @@ core::Result<Qos> participant_qos(const NetworkOptions& options) {
     set(name, "file:" + (folder / file).string());
   }
 
+  // Plugins of Cyclone DDS, by absolute path
   for (const auto& [plugin, library, function] : {std::tuple{"auth", "auth", "authentication"},
                                                   {"access", "ac", "access_control"},
                                                   {"crypto", "crypto", "crypto"}}) {
@@ -87,7 +91,6 @@ core::Result<Qos> participant_qos(const NetworkOptions& options) {
     set((head + "init").c_str(), fmt::format("init_{}", function));
     set((head + "finalize").c_str(), fmt::format("finalize_{}", function));
   }
-
   return qos;
 }
 
