@@ -16,6 +16,7 @@ struct CompareCommand {
   OptionFlags flags;
 };
 
+/// Compares and prints what has changed.
 core::Result<void> run_compare(CompareCommand& command, Session& session) {
   if (auto applied = command.flags.apply(); !applied) return applied;
   command.request.open = recording_opener(session);
@@ -31,6 +32,7 @@ core::Result<void> run_compare(CompareCommand& command, Session& session) {
 }  // namespace
 
 void add_compare(CLI::App& app, Session& session) {
+  // The two maps and the output
   const auto state = std::make_shared<CompareCommand>();
   CLI::App* command =
       add_command(app, session, "compare", "Tell what has changed between two maps of a place",
@@ -44,6 +46,7 @@ void add_compare(CLI::App& app, Session& session) {
       ->required()
       ->type_name("DIFF");
 
+  // Stamps may be wrong
   const std::map<std::string, changes::Order> orders = {{"stamps", changes::Order::kStamps},
                                                         {"given", changes::Order::kGiven}};
   command
@@ -54,6 +57,7 @@ void add_compare(CLI::App& app, Session& session) {
       ->type_name("stamps|given")
       ->transform(one_of(orders));
 
+  // Points, progress and thresholds
   command
       ->add_option("--points", request.points,
                    "Largest number of points of each map, thinned by voxels; 0: all (default: 1500000)")
