@@ -125,6 +125,7 @@ void move_component(Map& map, KeyframeId root, const geometry::Rigid3& new_from_
     point.view_direction = new_from_old_world.rotation * point.view_direction;
   }
 
+  // Lines move with their observers
   for (const core::LineId id : map.line_ids()) {
     if (!is_inside(std::as_const(map).line(id))) continue;
     MapLine& line = map.line(id);
@@ -134,6 +135,7 @@ void move_component(Map& map, KeyframeId root, const geometry::Rigid3& new_from_
 }
 
 void split_component(Map& map, KeyframeId first) {
+  // Keyframes of one robot from `first` on
   const KeyframeId root = root_of(map, first);
   if (root == first) return;
   const std::set<KeyframeId> all = members(map, root);
@@ -156,17 +158,20 @@ void split_component(Map& map, KeyframeId first) {
       if (std::any_of(seen.begin(), seen.end(), is_other)) map.unobserve(point, id);
     }
 
+    // The same for lines
     for (const core::LineId line : map.lines_seen_by({id})) {
       const auto& seen = std::as_const(map).line(line).observations;
       if (std::any_of(seen.begin(), seen.end(), is_other)) map.unobserve(line, id);
     }
   }
 
+  // Loops across the split no longer hold
   const auto is_between = [&](const KeyframeEdge& e) { return is_later(e.a) != is_later(e.b); };
   std::vector<LoopEdge> loops = map.loops();
   loops.erase(std::remove_if(loops.begin(), loops.end(), is_between), loops.end());
   map.set_loops(std::move(loops));
 
+  // Constraints across it keep their number, without weight
   const std::map<std::uint64_t, SurfaceEdge> edges = map.edges();
   for (auto [number, edge] : edges) {
     if (!is_between(edge) || all.count(edge.a) == 0) continue;

@@ -40,6 +40,7 @@ bool beyond_noise(double off_m, double off_rad, double sigma_m) {
 }
 
 PathCheck check_path(const std::vector<FramePose>& frames, const Map& map) {
+  // One frame before, for each robot
   PathCheck check;
   std::map<std::int32_t, const FramePose*> last;  // by robot
 
@@ -66,7 +67,6 @@ PathCheck check_path(const std::vector<FramePose>& frames, const Map& map) {
     check.largest_rad = std::max(check.largest_rad, seen.off_rad);
     if (beyond_noise(seen.off_m, seen.off_rad, frame.step_sigma_m)) check.tears.push_back(seen);
   }
-
   return check;
 }
 

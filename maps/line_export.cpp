@@ -20,6 +20,7 @@ core::Result<void> write_lines_ply(const std::filesystem::path& file,
                                    const std::vector<LineSegment3>& segments,
                                    const std::vector<std::array<std::uint8_t, 3>>& colors,
                                    const std::vector<std::string>& comments) {
+  // One colour per line, or none
   if (!colors.empty() && colors.size() != segments.size()) {
     return core::failure(core::ErrorKind::kInternal, file.string() + ": as many colours as lines are needed");
   }
@@ -37,6 +38,7 @@ core::Result<void> write_lines_ply(const std::filesystem::path& file,
     const auto& [start, end] = segments[i];
     if (!start.allFinite() || !end.allFinite()) continue;
 
+    // Both ends have the line's colour
     const auto& rgb = colors.empty() ? kBlue : colors[i];
     const auto first = static_cast<std::uint32_t>(position[0].size());
     for (const Eigen::Vector3d& point : {start, end}) {

@@ -145,7 +145,6 @@ std::uint64_t content_hash(const Map& map) {
       hash.number(f.segment.end.y());
     }
   }
-
   return hash.value();
 }
 

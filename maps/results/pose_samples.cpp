@@ -53,6 +53,7 @@ core::Result<void> write_pose_samples(const std::filesystem::path& file,
 }
 
 core::Result<std::vector<KeyframeSamples>> read_pose_samples(const std::filesystem::path& file) {
+  // The header is checked last, with the count
   std::ifstream in(file, std::ios::binary);
   std::string header(kHeader, '\0');
   in.read(header.data(), kHeader);

@@ -112,8 +112,6 @@ core::Result<void> StoredMaps::arrange(const core::Executor& executor) {
   std::set<std::string> robot_names;
   std::int32_t number = 0;
   std::vector<RobotNumbers> numbers(parts_.size());
-
-  // Names are unique, numbers consecutive
   for (std::size_t p = 0; p < parts_.size(); ++p) {
     StoredPart& part = parts_[p];
     RobotNumbers& to = numbers[p];

@@ -198,6 +198,7 @@ core::Result<std::size_t> StoredRun::write_keyframe_clouds(const fs::path& folde
 
 /// The run's cloud file, else its views fused again.
 core::Result<cloud::CloudFile> read_map_cloud(const MapPlace& place, const core::Executor& executor) {
+  // A written cloud needs no store
   std::error_code ec;
   const bool written =
       place.result && (fs::exists(place.result->ply(), ec) || fs::exists(place.result->pcd(), ec));

@@ -114,7 +114,6 @@ core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& ma
     views.robots.push_back(keyframe.valid() ? keyframe.robot : frame.robot);
     views.stamps.push_back(stamp);
 
-    // A robot without a path stands still
     const auto path = paths.find(views.robots.back());
     views.velocities.push_back(path == paths.end() ? geometry::Vector6d(geometry::Vector6d::Zero())
                                                    : geometry::velocity_at(path->second, stamp));

@@ -159,6 +159,7 @@ StoredMap MapRows::map(std::int64_t robot, const MapRow& row) const {
   MapParts parts;
   if (keyframes_.size() != states_.size()) throw BadBytes("a keyframe has no pose, or a pose no keyframe");
 
+  // Poses and parents are rows of their own table
   for (const auto& [key, keyframe] : keyframes_) {
     if (!is_of(key, robot)) continue;
     const auto state = states_.find(key);
@@ -179,6 +180,7 @@ StoredMap MapRows::map(std::int64_t robot, const MapRow& row) const {
   parts.next = row.next;
   parts.loops = row.loops;
 
+  // Frames and log are beside the map
   StoredMap stored;
   stored.frames = gathered(frames_, robot);
   stored.log = gathered(log_, robot);

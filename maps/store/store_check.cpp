@@ -201,6 +201,7 @@ void check_name(const RowName& name) {
 }
 
 RowContent check_row(const RowName& name, const Bytes& bytes, std::vector<RobotInfo>& robots) {
+  // Rows arrive packed
   check_name(name);
   const std::string table = kRowTables[name.table].name;
   const auto plain = [&](std::size_t most) { return unpack(bytes.data(), bytes.size(), most); };

@@ -96,6 +96,7 @@ void line_columns(Io& io, std::vector<LineFeature>& lines) {
 /// Single-precision image, stored as byte planes.
 template <typename Io>
 void thumbnail(Io& io, cv::Mat& image) {
+  // Only single precision is stored
   if (!image.empty() && image.type() != CV_32FC1)
     throw std::invalid_argument("store: thumbnail is no CV_32FC1");
 

@@ -145,6 +145,7 @@ void StoreReplica::Impl::put(const RowTable& table, const StoreRow& row) {
 }
 
 void StoreReplica::Impl::apply_row(const StoreRow& row) {
+  // Messages name table and key
   const RowTable& table = kRowTables[row.name.table];
   const std::string where =
       std::string(table.name) + " " +

@@ -52,6 +52,7 @@ void append(StoreRow row, ByteWriter& to) {
 }
 
 void consume_rows(Bytes& bytes, const std::function<void(const StoreRow&, std::size_t)>& row) {
+  // Each row begins with its length
   constexpr std::size_t kLength = sizeof(std::uint32_t);  // in front of each
   const auto at = [&](std::size_t offset) { return bytes.begin() + static_cast<std::ptrdiff_t>(offset); };
   std::size_t done = 0;

@@ -328,6 +328,7 @@ core::Result<StoreWriter> StoreWriter::create(const std::filesystem::path& file,
     return core::output_error(file.string() + ": exists already; remove it or write to another folder");
   }
 
+  // Header and tables in one transaction
   core::Result<StoreWriter> made = guarded(file, ErrorKind::kOutput, [&] {
     auto database = std::make_unique<Database>(file, Database::Access::kCreate);
     database->run("PRAGMA page_size = 8192");

@@ -48,6 +48,7 @@ cloud::PlyData as_ply(const evaluate::SurfaceSamples& cloud, const std::vector<f
     }
   };
 
+  // Normals only if they are known
   add_vectors(cloud.points, {"x", "y", "z"});
   if (!cloud.normals.empty()) add_vectors(cloud.normals, {"nx", "ny", "nz"});
 

@@ -27,6 +27,7 @@ void add_network_options(CLI::App& command, net::NetworkOptions& options) {
       ->delimiter(',')
       ->allow_extra_args(false);
 
+  // Multicast and TCP exclude each other
   command
       .add_option_function<std::string>(
           "--transport",

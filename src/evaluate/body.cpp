@@ -219,7 +219,6 @@ core::Result<Rigid3> fit_body(const std::vector<MatchedPose>& poses, bool scaled
         "its pose in the body is not determined{}",
         second / kDegree, remedy));
   }
-
   return Rigid3(turn, fit_lever(motions, turn, scaled));
 }
 

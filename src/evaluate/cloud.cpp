@@ -67,6 +67,7 @@ core::Result<Truth> make_truth(const Reference& reference, const CloudOptions& o
                                             reference.name, 1000.0 * coarsest));
     }
 
+    // A mesh must have an area
     truth.counted = sample_mesh(reference.mesh, std::max(options.mesh_spacing_m, coarsest));
     if (truth.counted.points.empty()) {
       return core::input_error(fmt::format("{}: the mesh has no area", reference.name));
@@ -196,6 +197,7 @@ Distances measure(const Points& from, const Points& normals, const std::vector<s
 
                   // One result per point, in the order of `from`
                   const MeasuredSurface& surface, const core::Executor& executor) {
+  // Normals are optional
   Distances out;
   out.error_m.resize(from.size());
   out.mm.resize(from.size());

@@ -105,7 +105,6 @@ std::string to_json(const CloudReport& r) {
     out["visible_only"] = r.visibility_used;
     out["alignment"] = json_of(r.alignment);
   }
-
   out["warnings"] = r.warnings;
   return core::json_text(out);
 }
@@ -140,6 +139,7 @@ std::string to_text(const CloudReport& r) {
                          s.precision, s.recall, s.f);
     }
 
+    // Only clouds with normals have a consistency
     if (r.normal_consistency) out += fmt::format("normal consistency {:.4f}\n", *r.normal_consistency);
   }
 

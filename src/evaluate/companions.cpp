@@ -33,6 +33,7 @@ fs::path folder_of(const fs::path& file) {
 
 /// Trajectories in the folder of the cloud, with the truth in that of the reference.
 std::vector<TrajectoryFiles> find_trajectories(const fs::path& cloud, const fs::path& reference) {
+  // Folders of result and world
   const fs::path map = folder_of(cloud);
   const fs::path world = folder_of(reference);
   const std::vector<std::string> truths = subfolders_with(world, "groundtruth.txt");

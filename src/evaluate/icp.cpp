@@ -123,6 +123,7 @@ IcpResult align_icp(const std::vector<Eigen::Vector3f>& cloud, const MeasuredSur
   std::vector<Eigen::Vector3d> some;
   for (std::size_t i = 0; i < cloud.size(); i += stride) some.push_back(cloud[i].cast<double>());
 
+  // The start counts if ICP cannot begin
   IcpResult result;
   result.reference_from_cloud = start;
 
@@ -133,6 +134,7 @@ IcpResult align_icp(const std::vector<Eigen::Vector3f>& cloud, const MeasuredSur
     result.overlap = static_cast<double>(pairs.size()) / static_cast<double>(some.size());
     if (pairs.size() < 6) return result;
 
+    // The farthest pairs may have no partner
     keep_nearest(pairs, options.trim);
     result.rmse_m = rms_residual(pairs);
     const Step step = solve(pairs);

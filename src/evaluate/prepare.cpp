@@ -112,6 +112,7 @@ core::Result<PreparedCloud> prepare(const SurfaceSamples& cloud, const core::Exe
                              : fmt::format("none of the cloud's {} points is finite", cloud.points.size()));
   }
 
+  // Such points are only reported
   if (report.not_finite > 0) {
     report.warnings.push_back(fmt::format("{} of {} points of the cloud are not finite and were left out",
                                           report.not_finite, cloud.points.size()));

@@ -268,6 +268,7 @@ std::vector<long long> sorted_keys(const std::vector<double>& stamps) {
 /// Share of the recording's frames that have a pose.
 void add_tracked_share(const Trajectory& estimate, const std::vector<long long>& frame_keys,
                        TrajectoryReport& report) {
+  // Without frames only the start is known
   if (frame_keys.empty()) {
     report.first_pose_s = std::max(0.0, estimate.front().stamp - report.truth.front().stamp);
     return;
@@ -388,8 +389,6 @@ core::Result<TrajectoryReport> evaluate_trajectory(const Trajectory& estimate, c
   if (!body) return tl::unexpected(body.error());
   report.body = *body;
   report.truth = std::move(*sorted_truth);
-
-  // Alignment of positions, with a scale if demanded
   const geometry::ScaledRigid3 alignment = align_path(matches, options.align);
   report.truth_from_estimate = alignment.rigid;
   if (options.align == TrajectoryAlignment::kSim3) report.scale = scale_report(matches, alignment.scale);

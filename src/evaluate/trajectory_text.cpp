@@ -205,6 +205,7 @@ std::string to_text(const TrajectoryReport& r) {
     out += fmt::format("scale {:.5f}, standard deviation {:.5f} (true length / estimated length)\n",
                        r.scale->value, r.scale->sigma);
 
+  // The body's pose, if it was removed
   if (r.body && r.body->removed) {
     const Eigen::Vector3d& at = r.body->body_from_camera.translation;
     out += fmt::format(
@@ -231,6 +232,7 @@ std::string to_text(const TrajectoryReport& r) {
     out += row("", r.rpe_frame.rotation_deg, "deg");
   }
 
+  // Seconds make recordings comparable
   if (r.rpe_second.pairs > 0) {
     out += row("RPE per " + seconds, r.rpe_second.translation_m, "m");
     out += row("", r.rpe_second.rotation_deg, "deg");

@@ -56,6 +56,7 @@ SharedPlane fitted(const Patches& patches, const PatchIndices& own, const Shared
   for (const std::size_t i : own) mean += patches[i].center;
   mean /= static_cast<double>(own.size());
 
+  // Scatter about their mean
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const std::size_t i : own) {
     const Eigen::Vector3d d = patches[i].center - mean;
@@ -109,6 +110,7 @@ WallPlane measured(const SurfaceSamples& cloud, const Patches& own, const Shared
     ++result.points;
   }
 
+  // Without points it stays unknown
   if (result.points > 0) result.slab_rms_mm = 1000.0 * std::sqrt(sum / static_cast<double>(result.points));
   return result;
 }

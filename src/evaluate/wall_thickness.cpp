@@ -109,12 +109,12 @@ std::optional<LocalPlane> main_plane(const Points& points, const PointIndices& v
       cost += std::min(h * h, flatness_m * flatness_m);
     }
 
+    // The plane with the least cost
     if (cost < best_cost) {
       best_cost = cost;
       best = plane;
     }
   }
-
   return best;
 }
 

@@ -105,6 +105,7 @@ core::Result<NetworkOptions> checked(NetworkOptions options, bool hub) {
     if (tcp && peer.find(':') == std::string::npos) peer += fmt::format(":{}", options.port);
   }
 
+  // A robot cannot find a hub by TCP
   if (tcp && !hub && options.peers.empty()) {
     return core::usage_error("--transport tcp: name the hub with --peers HOST[:PORT]");
   }

@@ -86,6 +86,7 @@ std::optional<Eigen::Matrix4d> read_matrix(const ConfigNode& node) {
 
 /// The pose of the depth camera; it must be a rigid transform.
 void read_color_from_depth(const ConfigNode& node, Camera& camera, ConfigProblems& problems) {
+  // A matrix of sixteen numbers
   const std::string path = "color_from_depth";
   const std::optional<Eigen::Matrix4d> matrix = read_matrix(node);
   if (!matrix) {
@@ -307,11 +308,13 @@ std::string to_yaml(const Camera& camera) {
                         *camera.readout_s);
   }
 
+  // A slope corrects the depth
   if (camera.depth_slope != std::array<double, 2>{}) {
     text += fmt::format("depth_slope: [{}, {}]  # 1/m along x, y: added to 1 / depth on the ray (x, y, 1)\n",
                         camera.depth_slope[0], camera.depth_slope[1]);
   }
 
+  // A delay of the depth sensor
   if (camera.depth_delay_s != 0.0) {
     text += fmt::format("depth_delay: {}  # s that depth images were taken later than their stamps say\n",
                         camera.depth_delay_s);
@@ -326,6 +329,7 @@ std::string to_yaml(const Camera& camera) {
       text += fmt::format("  - [{}, {}, {}, {}]\n", m(r, 0), m(r, 1), m(r, 2), m(r, 3));
     }
 
+    // Its intrinsics and lens
     text += "depth:\n" + pinhole_yaml(*camera.depth, "  ");
     if (camera.depth_lens.distorts()) {
       text += fmt::format("  model: {}\n", model_name(camera.depth_lens.model));

@@ -84,6 +84,7 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_for_check(const CheckRe
 /// Small pictures of the frames that the check needs, and which these are.
 check::FrameStore keep_frames(const dataset::FrameSource& source, const CheckRequest& request,
                               Session& session, check::CheckInput& input) {
+  // Frames that the check may use
   struct Wanted {
     std::size_t index;
     check::FrameChoice::Use use;
@@ -109,6 +110,7 @@ check::FrameStore keep_frames(const dataset::FrameSource& source, const CheckReq
       if (frame) chunk[k] = check::shrink(*frame, source.camera().color);
     });
 
+    // Small frames go to a file
     for (std::size_t k = 0; k < chunk.size(); ++k) {
       if (!chunk[k]) continue;  // the others will do
       input.frames.push_back(

@@ -38,6 +38,7 @@ void add_compare(CLI::App& app, Session& session) {
       add_command(app, session, "compare", "Tell what has changed between two maps of a place",
                   [&session, state] { return run_compare(*state, session); });
 
+  // Earlier map, later map and output
   changes::CompareRequest& request = state->request;
   command->add_option("BEFORE", request.before, "Earlier map: a result folder, map.db, or a cloud file")
       ->required();

@@ -114,6 +114,7 @@ std::vector<evaluate::ComponentReport> measure_components(const fs::path& result
     const auto way = dataset::read_trajectory(folder / "trajectory.txt");
     if (!way) continue;
 
+    // Share of all frames, if they are counted
     evaluate::ComponentReport component;
     component.name = folder.filename().string();
     component.poses = way->size();
@@ -123,6 +124,7 @@ std::vector<evaluate::ComponentReport> measure_components(const fs::path& result
       component.ate_m = measured->ate_m;
     components.push_back(std::move(component));
   }
+
   return components;
 }
 
@@ -178,7 +180,6 @@ core::Result<std::vector<evaluate::NamedReport>> measure_paths(const TrajectoryR
         evaluate::evaluate_trajectory(estimate->poses, fitting_truth.poses, request.options, stamps);
     if (!report) return about(file, truth_file, report.error());
 
-    // Components share the body's pose
     evaluate::TrajectoryOptions of_components = request.options;
     if (report->body && report->body->removed)  // too short to fit it to
       of_components.body = evaluate::body_text(report->body->body_from_camera);

@@ -154,7 +154,6 @@ core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
   if (request.json) {  // the printed table contains them
     for (const std::string& warning : report->warnings) session.console().warning(warning);
   }
-
   print("{}", request.json ? evaluate::to_json(*report) : evaluate::to_text(*report));
   if (!request.output.empty()) {
     auto done = write_error_clouds(*cloud, *reference, *report, pairs, request.output);

@@ -87,6 +87,7 @@ core::Result<void> check_outputs(const FilterRequest& request, const cloud::Filt
 /// The inputs one after the other, in the frame of the first.
 core::Result<cloud::CloudPtr> read_inputs(const FilterRequest& request, cloud::CloudColumns& columns,
                                           Eigen::Vector3d& shift, cloud::CloudFrame& frame) {
+  // All inputs become one cloud
   cloud::CloudPtr all;
   for (std::size_t i = 0; i + 1 < request.files.size(); ++i) {
     auto file = cloud::read_cloud(request.files[i], cloud::LargeCoordinates::kShifted);
@@ -99,6 +100,7 @@ core::Result<cloud::CloudPtr> read_inputs(const FilterRequest& request, cloud::C
       columns = std::move(file->columns);
       shift = file->shift;
       frame = std::move(file->frame);
+
     } else {
       // The others must fit into it.
       auto fits = cloud::check_one_frame(request.files.front().string(), shift, request.files[i].string(),
@@ -107,6 +109,8 @@ core::Result<cloud::CloudPtr> read_inputs(const FilterRequest& request, cloud::C
         fits = cloud::check_same_up(request.files.front().string(), frame, request.files[i].string(),
                                     file->frame);
       if (!fits) return tl::unexpected<core::Error>(fits.error());
+
+      // Appended in the coordinates of the first
       cloud::change_shift(*file->cloud, file->shift, shift);
       cloud::append_columns(columns, all->size(), file->columns, file->cloud->size());
       *all += *file->cloud;
@@ -249,6 +253,7 @@ void add_filter(CLI::App& app, Session& session) {
                                   [&session, request] { return filter(*request, session); });
   command->add_option("CHAIN", request->chain, "Filter chain: a file or a shipped name")->required();
 
+  // Files to read and the one to write
   command
       ->add_option(
           "FILES", request->files,
@@ -256,6 +261,8 @@ void add_filter(CLI::App& app, Session& session) {
       ->required()
       ->type_name("IN... OUT")
       ->expected(2, -1);
+
+  // Tiles, progress and plugins
   request->flags.add(*command, request->tiles);
   add_progress_option(*command, session);
   add_plugin_option(*command, session);

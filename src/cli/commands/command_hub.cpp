@@ -40,6 +40,7 @@ int hub(Session& session, net::HubRequest request, double quota_gb, const std::s
       !prepared)
     return session.fail(prepared.error());
 
+  // The page shows all robots
   Console& console = session.console();
   const auto live = live_map(page, request.fuse.output, console);
   if (!live) return session.fail(live.error());
@@ -66,6 +67,7 @@ int hub(Session& session, net::HubRequest request, double quota_gb, const std::s
 }  // namespace
 
 void add_hub(CLI::App& app, Session& session) {
+  // Shared by the command and its options
   const auto request = std::make_shared<net::HubRequest>();
   const auto quota_gb = std::make_shared<double>(20.0);
   const auto publish = std::make_shared<std::string>();

@@ -86,10 +86,11 @@ core::Result<void> describe_result(const std::filesystem::path& folder, bool jso
 }
 
 core::Result<void> describe_cloud(const std::filesystem::path& file) {
-  // Bounds of the finite points
+  // Large coordinates are read with a shift
   const auto read = cloud::read_cloud(file, cloud::LargeCoordinates::kShifted);
   if (!read) return tl::unexpected<core::Error>(read.error());
 
+  // Bounds of the finite points
   Eigen::Array3f low = Eigen::Array3f::Constant(INFINITY);
   Eigen::Array3f high = Eigen::Array3f::Constant(-INFINITY);
   for (const cloud::Point& p : *read->cloud) {

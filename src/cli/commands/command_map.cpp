@@ -120,6 +120,7 @@ void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& 
 }
 
 void add_map(CLI::App& app, Session& session) {
+  // Shared by the command and its options
   const auto request = std::make_shared<pipeline::MapRequest>();
   const auto inputs = std::make_shared<std::vector<std::string>>();
   const auto publish = std::make_shared<PublishRequest>();

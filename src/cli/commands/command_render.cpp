@@ -103,6 +103,7 @@ core::Result<void> add_paths(const maps::MapPlace& place, bool lines, viz::Scene
     if (lines) segments = stored->lines();
   }
 
+  // Lines are drawn as segments
   for (const auto& [a, b] : segments) scene.segments.push_back({a, b});
   return {};
 }

@@ -49,6 +49,7 @@ int robot(Session& session, net::RobotRequest request, const PublishRequest& pub
     if (*finished) earlier = request.map.output;
   }
 
+  // Only transmission is left to do
   if (!earlier.empty()) {
     const auto outcome = net::hand_in(request, earlier, console, stop, status);
     console.end_progress();
@@ -65,6 +66,7 @@ int robot(Session& session, net::RobotRequest request, const PublishRequest& pub
 }  // namespace
 
 void add_robot(CLI::App& app, Session& session) {
+  // Shared by the command and its options
   const auto request = std::make_shared<net::RobotRequest>();
   request->map.pipeline = "robot";
   const auto publish = std::make_shared<PublishRequest>();

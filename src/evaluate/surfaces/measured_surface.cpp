@@ -15,6 +15,7 @@ Foot MeshSurface::foot(const Eigen::Vector3d& q) const {
 
 /// True if the neighbours do not leave half of the plane free.
 bool SampledSurface::surrounded(const Eigen::Vector3d& on_plane, const Eigen::Vector3d& normal) const {
+  // Neighbours of the foot
   constexpr double kPi = 3.14159265358979323846;
   constexpr std::size_t kNeighbors = 12;
   std::vector<Neighbor> found;

@@ -59,6 +59,7 @@ core::Result<Qos> participant_qos(const NetworkOptions& options) {
   Qos qos = new_qos();
   if (options.security.empty()) return qos;
 
+  // Paths must not depend on the working directory
   std::error_code ec;
   const std::filesystem::path folder = std::filesystem::absolute(options.security);
   const auto set = [&](const char* name, const std::string& value) {
@@ -95,6 +96,7 @@ core::Result<Qos> participant_qos(const NetworkOptions& options) {
 }
 
 std::string domain_configuration(const NetworkOptions& options, bool hub) {
+  // Peers are named where multicast is missing
   const bool tcp = options.transport == Transport::kTcp;
   const bool local = options.interface == "lo";
   std::string peers;

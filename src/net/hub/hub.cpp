@@ -147,6 +147,7 @@ core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, con
                                                   const HubServer::Collected& collected,
                                                   const HubMeetings& meetings, const core::Executor& executor,
                                                   core::Log& log, const pipeline::Progress& progress) {
+  // Result in a folder below the received data
   std::string reason;
   pipeline::FuseRequest last = request.fuse;
   last.maps = received_maps(folder, collected, request.robots, reason);
@@ -156,6 +157,7 @@ core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, con
   if (auto removed = core::remove_own_files(last.output, maps::result_kind().files); !removed)
     return tl::unexpected(removed.error());
 
+  // Without a map there is no result
   const auto fuse = [&]() -> core::Result<pipeline::RunSummary> {
     if (!last.maps.empty()) {
       return pipeline::fuse_stored_maps(last, executor, log, core::StopToken(), progress);
@@ -171,6 +173,7 @@ core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, con
   if (!summary && leave_out_damaged(last.maps, executor, log, reason)) summary = fuse();
   if (!summary) return tl::unexpected(summary.error());
 
+  // The result moves into the hub's folder
   if (!reason.empty()) add_reason(reason, summary->reason);
   if (auto moved = move_all(last.output, folder); !moved) return tl::unexpected(moved.error());
   if (auto added = add_network(folder / "summary.json", collected.traffic, meetings.meetings(), reason);

@@ -104,6 +104,7 @@ int HubMeetings::add(const std::string& robot, const maps::StoredMap& stored) {
 
 /// Searches in the background; true if one has been reported.
 bool HubMeetings::step(const std::map<std::string, RobotSession>& robots) {
+  // One search at a time
   if (job_.valid()) {
     if (!job_.ready()) return false;
     report();
@@ -118,6 +119,7 @@ bool HubMeetings::step(const std::map<std::string, RobotSession>& robots) {
   }
   if (copies.empty()) return false;
 
+  // The search runs while the hub serves
   job_ = executor_->submit([this, copies = std::make_shared<decltype(copies)>(std::move(copies))] {
     for (const auto& [robot, copy] : *copies) search(robot, copy);
   });

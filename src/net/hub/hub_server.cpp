@@ -56,6 +56,7 @@ core::Result<void> HubServer::load_ledger() {
     robot.run = run;
     robot.incarnation = std::strtoull(texts[key_of(robot.name, "incarnation")].c_str(), nullptr, 10);
 
+    // A robot that was done stays done
     const auto session = open_session(robot);
     if (!session) return tl::unexpected(session.error());
     (*session)->done = texts[key_of(robot.name, "state")] == kDone;
@@ -318,6 +319,7 @@ void HubServer::serve(const core::StopToken& stop, const Status& status) {
   auto line_at = Clock::now();
   std::uint64_t before = received_bytes();
 
+  // Statuses and chunks first
   while (!stop.stop_requested()) {
     bus_->wait(kWait);
     poll();

@@ -106,6 +106,7 @@ core::Result<void> RobotSession::begin(const Chunk& chunk) {
 }
 
 core::Result<void> RobotSession::receive(const Chunk& chunk) {
+  // Numbers that no robot sends
   traffic_.received_bytes += chunk.bytes.size();
   if (chunk.stream > 1) return core::input_error("an unknown stream");
   if (chunk.count == 0 || chunk.count > kMaxChunks || chunk.index >= chunk.count || chunk.number <= 0) {
@@ -129,6 +130,7 @@ core::Result<void> RobotSession::receive(const Chunk& chunk) {
   }
   if (chunk.index != incoming_.chunks) return {};
 
+  // The last chunk commits the transaction
   const bool last = chunk.index + 1 == chunk.count;
   const core::Result<void> appended = append(chunk, last);
   if (!appended || last) roll_back();

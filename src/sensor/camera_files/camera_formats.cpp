@@ -119,6 +119,7 @@ std::string take_matrix(const std::vector<double>& numbers, Camera& camera) {
   if (at(2, 2) != 1.0 || other != 0.0)
     return "the matrix is not that of a camera (expected: fx 0 cx, 0 fy cy, 0 0 1)";
 
+  // No camera here has skewed pixels
   if (std::abs(skew) > 1e-6 * std::abs(at(0, 0))) {
     return fmt::format("the matrix has a skew of {}, which no camera here has", skew);
   }

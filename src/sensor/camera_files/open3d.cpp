@@ -29,6 +29,7 @@ core::Result<CameraReading> read_open3d(const CameraText& text) {
   const auto height = number_at(node, {"height"});
   reading.has_size = width && height;
 
+  // Width and height come together
   if (reading.has_size) {
     camera.color.width = static_cast<int>(*width);
     camera.color.height = static_cast<int>(*height);

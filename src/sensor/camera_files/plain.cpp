@@ -60,6 +60,7 @@ core::Result<CameraReading> read_plain(const CameraText& text) {
     return reading;
   }
 
+  // A list may end with the distortion
   if (n.size() != 4 && n.size() != 8 && n.size() != 9) {
     return refuse(
         0, fmt::format("has {} numbers (allowed: fx fy cx cy [k1 k2 p1 p2 [k3]], or a matrix of 3x3, 3x4 "

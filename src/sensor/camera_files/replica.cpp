@@ -36,6 +36,7 @@ core::Result<CameraReading> read_replica(const CameraText& text) {
   const core::ConfigNode* coefficients = find_any(node, {"distortion"});
   if (coefficients == nullptr) return reading;
 
+  // Coefficients without a model are OpenCV's
   const auto d = numbers_in(*coefficients);
   const std::string wrong =
       d ? take_coefficients("", *d, camera) : "the distortion coefficients are not numbers";
