@@ -32,9 +32,8 @@ const char* const kFooter =
     "5 output cannot be written or memory is short, 130 stopped before there was anything to write.\n"
     "More about a command: plumbline COMMAND --help";
 
-/// The exit code `code`, unless standard output cannot be written, of which `cause` is the errno if it is
-/// known: it is buffered, and what is lost may show only at the end. A reader that closes its pipe wants no
-/// more.
+/// `code`, unless standard output could not be written: it is buffered, so that a failure may show only at
+/// the end. `cause`: its errno, 0 if not known. A reader that has closed the pipe is not an error.
 int check_standard_output(Session& session, int code, int cause = 0) {
   errno = 0;
   std::cout.flush();

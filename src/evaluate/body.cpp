@@ -31,7 +31,7 @@ struct Motion {
   Vector3d camera_turn;
 };
 
-/// Motions that turn enough to tell directions, between poses that are 1, 2, 4, 8 ... apart.
+/// Motions that turn enough to determine directions, between poses that are 1, 2, 4, 8 ... apart.
 std::vector<Motion> turning_motions(const std::vector<MatchedPose>& poses) {
   // Long trajectories are thinned
   constexpr std::size_t kMostPoses = 1000;

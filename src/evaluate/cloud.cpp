@@ -247,7 +247,7 @@ void add_scores(const std::vector<double>& cloud_mm, const std::vector<double>& 
   }
 }
 
-/// In what order to visit the points that completeness is measured at.
+/// The order in which completeness visits its points: neighbours one after another.
 std::vector<std::uint32_t> order_in_space(const Truth& truth) {
   if (truth.index && truth.hidden == 0) return truth.index->order();
   return PointIndex(truth.counted.points).order();
@@ -288,7 +288,7 @@ void compare(const PreparedCloud& cloud, const Truth& truth, const CloudOptions&
   report.reference_error_m = completeness.error_m;
 }
 
-/// Warns if the cloud lies elsewhere, because its numbers then say nothing about the map.
+/// Warns if cloud and reference are apart, because the numbers then say nothing about the map.
 void warn_when_apart(const CloudOptions& options, CloudReport& report) {
   constexpr double kApartMm = 100.0;
   if (report.accuracy_mm.median < kApartMm) return;

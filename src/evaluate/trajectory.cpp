@@ -62,10 +62,10 @@ core::Result<Trajectory> checked(const char* which, const Trajectory& given) {
 
 struct Matches {
   std::vector<MatchedPose> pairs;
-  std::size_t ambiguous = 0;  ///< poses that share a stamp, of which the truth has another number there
+  std::size_t ambiguous = 0;  ///< poses with a common stamp that the truth has more or less often
 };
 
-/// The poses of the truth at this very stamp: the first of them and how many.
+/// The poses of the truth with this stamp: the first of them and their number.
 std::pair<Trajectory::const_iterator, std::size_t> truth_at(const Trajectory& truth, double stamp) {
   constexpr double kSame = 1e-6;  // seconds since 1970 as a double are good to 2e-7
   const auto first = std::lower_bound(truth.begin(), truth.end(), stamp - kSame,
@@ -75,8 +75,8 @@ std::pair<Trajectory::const_iterator, std::size_t> truth_at(const Trajectory& tr
   return {first, static_cast<std::size_t>(last - first)};
 }
 
-/// Poses with stamps of their own get the truth interpolated; poses that share a stamp are paired with as
-/// many of the truth in the order of both files.
+/// A pose whose stamp is unique gets the interpolated truth; poses with a common stamp are paired with as
+/// many of the truth, in the order of both files.
 Matches match(const Trajectory& estimate, const Trajectory& truth, double max_dt_s) {
   // A group of poses with one stamp
   Matches matches;

@@ -34,7 +34,7 @@ void declare_pinhole(core::OptionTable& table, Pinhole& pinhole) {
   table.number("cy", pinhole.cy, {}, "px", "Principal point; 0 is the centre of the topmost pixel");
 }
 
-/// Every key of a pinhole must be there and the principal point inside the image.
+/// Every key of a pinhole must exist, and the principal point must be inside the image.
 void check_pinhole(const ConfigNode& map, const Pinhole& pinhole, const std::string& path,
                    ConfigProblems& problems) {
   for (const char* key : {"width", "height", "fx", "fy", "cx", "cy"}) {

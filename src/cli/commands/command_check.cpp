@@ -36,7 +36,7 @@ struct CheckRequest {
   dataset::OpenOptions open;
 };
 
-/// RMS of the standard deviations that a result tells of its keyframes' positions; 0: it tells none.
+/// RMS of the standard deviations of keyframes' positions that a result states; 0: it states none.
 double told_by(const fs::path& result) {
   // The table may lack the column
   std::ifstream table(result / "keyframes.csv");
@@ -81,7 +81,7 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_for_check(const CheckRe
                               session.console());
 }
 
-/// Small pictures of the frames that the check needs, and which these are.
+/// The frames that the check needs, scaled down, and their numbers in `input`.
 check::FrameStore keep_frames(const dataset::FrameSource& source, const CheckRequest& request,
                               Session& session, check::CheckInput& input) {
   // Frames that the check may use
@@ -100,7 +100,7 @@ check::FrameStore keep_frames(const dataset::FrameSource& source, const CheckReq
     if (use != check::FrameChoice::Use::kNone) wanted.push_back({i, use});
   }
 
-  // A few are decoded side by side, and shrunk at once.
+  // A few are decoded in parallel and scaled down at once.
   check::FrameStore store(fs::temp_directory_path());
   constexpr std::size_t kChunk = 16;  // frames in memory
   for (std::size_t begin = 0; begin < wanted.size(); begin += kChunk) {

@@ -58,8 +58,8 @@ core::Result<std::vector<evaluate::TrajectoryPair>> read_pairs(const CloudReques
   return pairs;
 }
 
-/// Up in the reference's frame: as that is known; or as the cloud has it, which lies in this frame now, if no
-/// camera's path tells it either.
+/// The upward direction in the reference's frame: the reference's, else that of the aligned cloud. None: the
+/// picture estimates it, from the cameras' paths if there are any.
 std::optional<Eigen::Vector3d> up_of(const evaluate::Reference& reference, const cloud::CloudFrame& of_cloud,
                                      const geometry::Rigid3& reference_from_cloud, bool cameras) {
   if (reference.frame.up() == cloud::Up::kZ) return Eigen::Vector3d::UnitZ();

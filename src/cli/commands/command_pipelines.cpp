@@ -149,7 +149,7 @@ void add_pipeline_arguments(CLI::App& command, const RequestPtr& request) {
       ->allow_extra_args(false);
 }
 
-/// Below `filters`; beside the schema of pipelines, which has it inside.
+/// Adds `filters schema`; the schema of pipelines contains the same.
 void add_chain_schema(CLI::App& filters, Session& session) {
   CLI::App* command =
       add_command(filters, session, "schema", "JSON Schema of filter chains, for editors", [&session] {

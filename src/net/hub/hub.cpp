@@ -79,8 +79,8 @@ nlohmann::json json_of(const std::vector<RobotTraffic>& traffic) {
   return robots;
 }
 
-/// Adds the network's traffic, the meetings and what the network's part in them makes doubtful to the summary
-/// of the fusion.
+/// Adds the network's traffic, the meetings and the reason for doubt, if there is one, to the summary of the
+/// fusion.
 core::Result<void> add_network(const fs::path& file, const std::vector<RobotTraffic>& traffic,
                                const std::vector<pipeline::Meeting>& meetings, const std::string& reason) {
   auto read = core::read_json(file);
