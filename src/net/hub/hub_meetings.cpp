@@ -75,7 +75,7 @@ void HubMeetings::search(const std::string& robot, const maps::MapFollower& copy
 
 /// Adds the keyframes of a robot's map that are new. Returns how many.
 int HubMeetings::add(const std::string& robot, const maps::StoredMap& stored) {
-  // A merged map has found its meetings already
+  // Only maps of a single robot take part
   Robot& known = robots_[robot];
   const std::vector<core::KeyframeId> ids = stored.map.keyframe_ids();
   const auto of_others = [](core::KeyframeId id) { return id.robot != 0; };

@@ -82,7 +82,7 @@ core::Result<void> RobotLink::follow(const fs::path& store) {
                                {"incarnation", std::to_string(next.incarnation)}});
   if (!put) return put;
 
-  // Both sides begin again with the new store
+  // Link and sender begin again with the new store
   next.map_head = next.clouds_head = 0;
   robot_ = std::move(next);
   store_.follow(store);

@@ -27,7 +27,7 @@ std::string cut_out(const core::ConfigNode& tree) {
 }
 
 core::Result<CameraReading> read_ros(const CameraText& text) {
-  // ROS writes zeros for an unknown size
+  // A size of zero is unknown
   CameraReading reading = blank_reading(text, kRosCamera);
   Camera& camera = reading.camera;
   const auto width = number_at(text.tree, {"image_width", "width"});
