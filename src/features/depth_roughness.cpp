@@ -57,6 +57,8 @@ float roughness_limit(std::vector<float> roughness) {
   constexpr float kLeast = 0.2F;    // depth without any noise has steps of rounding
   constexpr std::size_t kFew = 30;  // fewer samples do not show the usual roughness: the model is used
   if (roughness.size() < kFew) return kRougher;
+
+  // Relative to the usual roughness in this image
   const auto middle = roughness.begin() + static_cast<std::ptrdiff_t>(roughness.size() / 2);
   std::nth_element(roughness.begin(), middle, roughness.end());
   return kRougher * std::clamp(*middle, kLeast, 2.0F);

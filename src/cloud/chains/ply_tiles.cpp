@@ -78,11 +78,13 @@ core::Result<void> PlyTiles::take_layout(const std::filesystem::path& file, cons
 core::Result<void> PlyTiles::add(const std::filesystem::path& file) {
   ByteReader reader(file);
   if (!reader.open()) return core::input_error(file.string() + ": does not exist, or cannot be read");
-  const auto header = read_ply_header(reader);
 
+  // All files must have the same properties
+  const auto header = read_ply_header(reader);
   if (!header) return core::input_error(file.string() + ": " + header.error().message);
   if (auto fits = take_layout(file, *header); !fits) return fits;
 
+  // A truncated file is refused before its points are read
   const std::uint64_t count = header->elements.front().count;
   if (count > reader.remaining() / record_size_) {
     return core::input_error(fmt::format("{}: is truncated: {} points are promised, {} are there",
@@ -103,6 +105,7 @@ core::Result<void> PlyTiles::add(const std::filesystem::path& file) {
                       file.string(), kMostTiles, tile_m_));
     }
 
+    // Points wait in memory and are written together
     if (waiting_ < kMostWaiting) continue;
     if (auto written = write_waiting(); !written) return written;
   }
@@ -145,6 +148,8 @@ void PlyTiles::put(const std::uint8_t* record) {
 core::Result<void> PlyTiles::write_waiting() {
   for (auto& [key, tile] : tiles_) {
     if (tile.waiting.empty()) continue;
+
+    // The header is written without the number of points
     const std::filesystem::path file = file_of(key);
     std::error_code error;
     const bool begun = std::filesystem::exists(file, error);
@@ -162,6 +167,8 @@ core::Result<void> PlyTiles::write_waiting() {
 
 core::Result<void> PlyTiles::finish() {
   if (auto written = write_waiting(); !written) return written;
+
+  // Only now are the numbers of points known
   for (const auto& [key, tile] : tiles_) {
     std::fstream out(file_of(key), std::ios::binary | std::ios::in | std::ios::out);
     out << header(tile.points);

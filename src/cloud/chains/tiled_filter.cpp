@@ -78,6 +78,7 @@ core::Result<void> join(const std::vector<fs::path>& pieces, std::size_t points,
     const std::size_t count = header.find("element vertex ");
     const std::size_t behind = header.find('\n', count);
 
+    // The first piece's header, with the points of all
     if (properties.empty()) {
       properties = header.substr(behind);
       out.write(header.substr(0, count) + fmt::format("element vertex {}", points) + properties);
@@ -85,6 +86,7 @@ core::Result<void> join(const std::vector<fs::path>& pieces, std::size_t points,
       return core::usage_error("the chain gives tiles different properties; run it without --tiles");
     }
 
+    // The points follow unchanged, block by block
     constexpr std::uint64_t kBlock = 1 << 18;
     while (reader.remaining() > 0) {
       const auto size = static_cast<std::size_t>(std::min(kBlock, reader.remaining()));

@@ -37,6 +37,8 @@ class NormalsFilter : public Filter {
     estimation.setInputCloud(points);
     pcl::PointCloud<pcl::Normal> normals;
     estimation.compute(normals);
+
+    // Not a number for points with too few neighbours
     for (std::size_t i = 0; i < points->size(); ++i) {
       (*points)[i].getNormalVector3fMap() = normals[i].getNormalVector3fMap();
       (*points)[i].curvature = normals[i].curvature;

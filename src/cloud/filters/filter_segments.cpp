@@ -85,6 +85,8 @@ class PlaneFilter : public Filter {
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
     const CloudConstPtr points = finite_list(input);
     std::vector<int> segments(points->size(), kNoSegment);
+
+    // The largest plane first, the next among the other points
     auto rest = std::make_shared<pcl::Indices>(points->size());
     for (std::size_t i = 0; i < rest->size(); ++i) (*rest)[i] = static_cast<pcl::index_t>(i);
     for (int plane = 0; plane < planes_ && spans_a_plane(*points, *rest); ++plane) {
@@ -191,6 +193,7 @@ class ClustersFilter : public Filter {
   }
 
  private:
+  // Groups of points connected by steps of at most this length.
   static std::vector<pcl::Indices> clusters_of(const CloudConstPtr& points, double distance_m,
                                                int min_points) {
     const auto tree = std::make_shared<pcl::search::KdTree<Point>>(false);
@@ -216,6 +219,7 @@ class ClustersFilter : public Filter {
     const auto leaf = static_cast<float>(leaf_m_);
     const auto block = [&](float x) { return static_cast<int>(std::floor(x / (kBlock * leaf))); };
 
+    // Blocks of few enough cells for PCL to number
     std::map<std::array<int, 3>, pcl::IndicesPtr> blocks;
     for (std::size_t i = 0; i < points->size(); ++i) {
       const Point& p = (*points)[i];
@@ -225,13 +229,14 @@ class ClustersFilter : public Filter {
     }
 
     pcl::VoxelGrid<Point> grid;
+
+    // Means of cells; every point knows the mean of its cell
     grid.setInputCloud(points);
     grid.setLeafSize(leaf, leaf, leaf);
     grid.setDownsampleAllData(false);  // positions alone
     grid.setSaveLeafLayout(true);
     const auto means = std::make_shared<Cloud>();
     std::vector<std::uint32_t> mean_of(points->size());
-
     for (const auto& [place, indices] : blocks) {
       Cloud part;
       grid.setIndices(indices);
@@ -245,6 +250,7 @@ class ClustersFilter : public Filter {
       *means += part;
     }
 
+    // Clusters of means
     const std::vector<pcl::Indices> groups = clusters_of(means, distance_m, 1);
     std::vector<std::uint32_t> group_of(means->size());
     for (std::size_t g = 0; g < groups.size(); ++g) {
@@ -252,11 +258,13 @@ class ClustersFilter : public Filter {
         group_of[static_cast<std::size_t>(mean)] = static_cast<std::uint32_t>(g);
     }
 
+    // Points join the cluster of their mean
     std::vector<pcl::Indices> clusters(groups.size());
     for (std::size_t i = 0; i < points->size(); ++i) {
       clusters[group_of[mean_of[i]]].push_back(static_cast<pcl::index_t>(i));
     }
 
+    // Small clusters are left out
     const auto few = [&](const pcl::Indices& c) { return c.size() < static_cast<std::size_t>(min_points); };
     clusters.erase(std::remove_if(clusters.begin(), clusters.end(), few), clusters.end());
     return clusters;

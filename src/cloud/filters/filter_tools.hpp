@@ -68,6 +68,7 @@ template <typename Keep>
 CloudPtr select(const Cloud& input, const Keep& keep) {
   auto output = like(input);
 
+  // An organised cloud keeps its shape: rejected points become NaN
   if (organised(input)) {
     output->points = input.points;
     output->width = input.width;
@@ -79,11 +80,11 @@ CloudPtr select(const Cloud& input, const Keep& keep) {
     return output;
   }
 
+  // A list only holds the chosen points
   output->points.reserve(input.size());
   for (std::size_t i = 0; i < input.size(); ++i) {
     if (finite(input[i]) && keep(i, input[i])) output->points.push_back(input[i]);
   }
-
   make_list(*output);
   return output;
 }

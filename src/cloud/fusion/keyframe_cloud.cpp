@@ -33,6 +33,7 @@ float smoothing_share(const cv::Mat& depth, float min_depth, float max_depth) {
   constexpr std::size_t kFew = 200;
   std::vector<float> bends;
 
+  // Bending of the inverse depth, relative to its noise
   for (int v = 0; v < depth.rows; v += kStep) {
     const float* row = depth.ptr<float>(v);
     for (int u = kStep; u + kStep < depth.cols; u += kStep) {
@@ -45,6 +46,7 @@ float smoothing_share(const cv::Mat& depth, float min_depth, float max_depth) {
     }
   }
 
+  // Too few pixels to judge: the model's noise
   if (bends.size() < kFew) return 1.0F;
   const float share = core::median(std::move(bends)) / (0.5F * kMedianOfNormal);
   return std::min(1.0F, share * share);
@@ -82,6 +84,8 @@ class PointMaker {
     const float y = (static_cast<float>(v) - cy_) / fy_;
     for (int i = 0; i < grid_.width; ++i) {
       Point& p = out[i];
+
+      // White if there is no colour image
       const int u = i * stride_;
       const cv::Vec3b bgr = color == nullptr ? cv::Vec3b(255, 255, 255) : color[u];
       p.b = bgr[0];
@@ -90,11 +94,13 @@ class PointMaker {
       p.a = 255;
       p.normal_x = p.normal_y = p.normal_z = kNan;
 
+      // Pixels without depth
       if (w[i] == 0.0F) {
         p.x = p.y = p.z = kNan;
         continue;
       }
 
+      // Position from the mean, or from the raw depth
       const float x = (static_cast<float>(u) - cx_) / fx_;
       p.z = position_.values.empty() ? depth[u] : 1.0F / position_.row(j)[i];
       p.x = x * p.z;
@@ -194,6 +200,8 @@ CloudPtr organised_cloud(const sensor::RgbdFrame& frame, const sensor::Pinhole& 
   if (!frame.color.empty() && (frame.color.type() != CV_8UC3 || frame.color.size() != size)) {
     throw std::invalid_argument("organised_cloud: colour must be CV_8UC3 of the camera's size");
   }
+
+  // Organised: pixels without depth are points as well
   const PointMaker maker(frame, camera, options);
   auto cloud = std::make_shared<Cloud>(static_cast<std::uint32_t>(maker.width()),
                                        static_cast<std::uint32_t>(maker.height()));

@@ -68,6 +68,8 @@ class ByteReader {
 
   bool fill(std::size_t count) {
     if (!open_ || remaining() < count) return false;
+
+    // Unread bytes move to the front
     std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
     end_ -= begin_;
     begin_ = 0;

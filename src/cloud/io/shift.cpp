@@ -35,6 +35,8 @@ std::optional<int> axis_of_column(Meaning meaning) {
 
 double with_shift(float value, double shift) {
   if (!std::isfinite(value)) return static_cast<double>(value);
+
+  // The float's decimal digits, not its binary value
   std::array<char, 64> text{};
   const auto written = std::to_chars(text.data(), text.data() + text.size(), value);
   double decimal = static_cast<double>(value);

@@ -74,6 +74,8 @@ Support support_of(const LineSegment& segment) {
   Support s;
   s.direction = segment.direction();
   s.normal = {-s.direction.y(), s.direction.x()};
+
+  // The gradient image has half the resolution
   s.middle = 0.5F * (segment.middle() - Eigen::Vector2f(0.5F, 0.5F));
   const float length = 0.5F * segment.length();
   s.columns = std::clamp(static_cast<int>(length / 4.0F) * 4, 4, kMaxColumns);
@@ -81,6 +83,7 @@ Support support_of(const LineSegment& segment) {
   return s;
 }
 
+// True if the whole support region is within the image.
 bool inside(const Support& s, const cv::Mat& gradient) {
   const float along = 0.5F * static_cast<float>(s.columns) * s.step;
   const float across = 0.5F * static_cast<float>(kRows) * kRowSpacing;
