@@ -39,6 +39,7 @@ bool make_template(const CornerPatch& patch, Template& to) {
       to.value[k] = row[u];
       to.dx[k] = 0.5F * static_cast<float>(row[u + 1] - row[u - 1]);
       to.dy[k] = 0.5F * static_cast<float>(row[u + kSide] - row[u - kSide]);
+
       mean += to.value[k];
       mean_x += to.dx[k];
       mean_y += to.dy[k];
@@ -151,6 +152,7 @@ std::optional<Eigen::Vector2f> align_patch(const CornerPatch& patch, const cv::M
     Eigen::Vector3f slope = Eigen::Vector3f::Zero();
     float product = 0.0F;
     float power = 0.0F;
+
     for (std::size_t k = 0; k < kCount; ++k) {
       const float value = values[k] - mean;
       const float off = value - gain * sought.value[k];

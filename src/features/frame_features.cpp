@@ -166,6 +166,7 @@ void PointGrid::within(const std::vector<PointFeature>& points, float x, float y
   for (int r = cell(y - radius, rows_); r <= cell(y + radius, rows_); ++r) {
     for (int c = cell(x - radius, columns_); c <= cell(x + radius, columns_); ++c) {
       const auto k = static_cast<std::size_t>(r * columns_ + c);
+
       for (int i = begin_[k]; i < begin_[k + 1]; ++i) {
         const int index = order_[static_cast<std::size_t>(i)];
         const Eigen::Vector2f& p = points[static_cast<std::size_t>(index)].pixel;

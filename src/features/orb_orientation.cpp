@@ -20,6 +20,8 @@ constexpr std::size_t kPatchColumns = 32;  // the last one weighs nothing
 struct Moments {
   std::array<std::int16_t, kPatchRows * kPatchColumns> x{};
   std::array<std::int16_t, kPatchRows * kPatchColumns> y{};
+
+  // Pixels outside the disk keep weight 0
   Moments() {
     for (int v = -kHalfPatch; v <= kHalfPatch; ++v) {
       for (int u = -kHalfPatch; u <= kHalfPatch; ++u) {
@@ -33,6 +35,7 @@ struct Moments {
   }
 };
 
+// Sums of x and y, weighted by intensity.
 PLUMBLINE_CLONES void weigh(const std::uint8_t* patch, const Moments& moments, int& m10, int& m01) {
   int sum_x = 0;
   int sum_y = 0;
@@ -55,6 +58,8 @@ float orb_orientation(const cv::Mat& image, int x, int y) {
                 image.ptr<std::uint8_t>(y - kHalfPatch + static_cast<int>(v)) + x - kHalfPatch,
                 kPatchColumns);
   }
+
+  // Direction of the intensity centroid
   int m10 = 0;
   int m01 = 0;
   weigh(patch.data(), moments, m10, m01);

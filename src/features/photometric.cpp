@@ -70,6 +70,7 @@ float steepness(const cv::Mat& image, int x, int y) {
   return gx * gx + gy * gy;
 }
 
+// The steepest pixel of a cell.
 Spot steepest(const cv::Mat& image, int left, int top, int cell) {
   Spot best;
   for (int y = top; y < top + cell; ++y) {
@@ -81,6 +82,7 @@ Spot steepest(const cv::Mat& image, int left, int top, int cell) {
   return best;
 }
 
+// Bilinear interpolation.
 float interpolated(const cv::Mat& image, float x, float y) {
   const int ix = static_cast<int>(x), iy = static_cast<int>(y);
   const float sx = x - static_cast<float>(ix), sy = y - static_cast<float>(iy);
@@ -127,9 +129,10 @@ std::vector<PhotometricSample> sample_level(const cv::Mat& image, std::size_t le
   const float per_y = static_cast<float>(depth.rows) / static_cast<float>(image.rows);
   const Surroundings around{static_cast<int>(2.5F * per_x + 0.5F), static_cast<int>(kHalo * per_x + 0.5F)};
   const int cell = kCell[level];
-
   const Eigen::Matrix3f rotation = camera_from_depth.rotation.cast<float>();
   const Eigen::Vector3f translation = camera_from_depth.translation.cast<float>();
+
+  // A cell's steepest pixel, where depth is continuous
   for (int cy = kBorder; cy + cell <= image.rows - kBorder; cy += cell) {
     for (int cx = kBorder; cx + cell <= image.cols - kBorder; cx += cell) {
       const Spot best = steepest(image, cx, cy, cell);
@@ -138,6 +141,7 @@ std::vector<PhotometricSample> sample_level(const cv::Mat& image, std::size_t le
       const float z = continuous_depth(depth, full_x, full_y, around);
       if (!(z > 0.0F)) continue;
 
+      // From the depth image to the camera
       const Eigen::Vector3f in_depth = camera.unproject(full_x, full_y, static_cast<double>(z)).cast<float>();
       const auto sample = sample_at(image, small, rotation * in_depth + translation);
       if (!sample) continue;
@@ -148,6 +152,7 @@ std::vector<PhotometricSample> sample_level(const cv::Mat& image, std::size_t le
     }
   }
 
+  // Rough depth is not reliable
   keep_smooth(roughness, samples);
   return samples;
 }

@@ -73,6 +73,7 @@ PoseCovariances BundleRound::covariances(const BundleState& state) {
                 std::to_string(kMostNumbers / 1'000'000) + " million numbers would be needed"};
   }
 
+  // Poses that are not constrained need a repair
   constexpr double kLeastShare = 1e-13;  // below, rounding errors are as large as what is taken out
   std::vector<Matrix6d> blocks = reduced_.inverse_blocks(equations_, kLeastShare);
   if (!are_held(blocks)) blocks = repaired();

@@ -37,6 +37,8 @@ void Database::file(Kind kind, const features::Descriptor256& descriptor, const 
   kinds_[at(word)] = kind;
   index_[at(word)].push_back(entry);
   seen_[at(entry.slot)].mass += weights_[at(word)];
+
+  // Listed once, on becoming overfull
   const bool before = vocabulary_.overfull(word);
   vocabulary_.count(word);
   if (!before && vocabulary_.overfull(word)) overfull_.push_back(word);
@@ -50,6 +52,8 @@ void Database::add(KeyframeId id, std::shared_ptr<const FrameFeatures> features)
   keyframes_.push_back(id);
   seen_.push_back({features, 0.0});
   make_room();
+
+  // Each feature under its word
   for (std::size_t i = 0; i < features->descriptors.size(); ++i) {
     file(Kind::kPoint, features->descriptors[i], {slot, static_cast<std::int32_t>(i)});
   }
@@ -57,6 +61,8 @@ void Database::add(KeyframeId id, std::shared_ptr<const FrameFeatures> features)
     file(Kind::kLine, features->lines[i].descriptor, {slot, static_cast<std::int32_t>(i)});
   }
   divide_overfull();
+
+  // Weights change slowly: again only after much growth
   const std::int64_t features_now =
       vocabulary_.feature_count(Kind::kPoint) + vocabulary_.feature_count(Kind::kLine);
   if (static_cast<double>(features_now) >= kGrowthToReweigh * static_cast<double>(weighed_at_)) reweigh();
@@ -64,6 +70,8 @@ void Database::add(KeyframeId id, std::shared_ptr<const FrameFeatures> features)
 
 void Database::divide_overfull() {
   int divisions = 0;
+
+  // A few at a time: adding a keyframe stays fast
   std::size_t next = 0;
   for (; next < overfull_.size() && divisions < kMaxDivisions; ++next) {
     if (!vocabulary_.overfull(overfull_[next])) continue;
@@ -78,11 +86,12 @@ void Database::divide(Word word) {
   const std::vector<Entry> entries = index_[at(word)];
   std::vector<features::Descriptor256> members;
   members.reserve(entries.size());
-
   for (const Entry& e : entries) members.push_back(descriptor(kind, e));
+
   const std::vector<Word> words = vocabulary_.divide(word, members);
   if (words.empty()) return;
 
+  // The new words take the entries of the divided one
   make_room();
   const double old_weight = weights_[at(word)];
   index_[at(word)] = {};
@@ -105,6 +114,8 @@ void Database::reweigh() {
   for (std::size_t w = 0; w < weights_.size(); ++w) {
     weights_[w] = vocabulary_.is_word(static_cast<Word>(w)) ? vocabulary_.weight(static_cast<Word>(w)) : 0.0;
   }
+
+  // A keyframe's mass is the sum of its weights
   for (Seen& seen : seen_) seen.mass = 0.0;
   for (std::size_t w = 0; w < weights_.size(); ++w) {
     for (const Entry& e : index_[w]) seen_[at(e.slot)].mass += weights_[w];

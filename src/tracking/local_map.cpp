@@ -35,8 +35,9 @@ std::vector<WorldSurface> fuse_voxels(const std::vector<WorldSurface>& samples, 
   cloud::CellMap<std::size_t> index;
   index.reserve(samples.size());
   std::vector<WorldSurface> fused;
-
   std::vector<double> weights;
+
+  // Sums, weighted by inverse variance
   for (const WorldSurface& s : samples) {
     const double w = 1.0 / (s.sigma * s.sigma);
     const auto [found, inserted] = index.try_emplace(voxel_of(s, voxel_m), fused.size());
@@ -53,6 +54,7 @@ std::vector<WorldSurface> fuse_voxels(const std::vector<WorldSurface>& samples, 
     weights[found->second] += w;
   }
 
+  // Means; part of the noise is common to neighbours
   for (std::size_t i = 0; i < fused.size(); ++i) {
     fused[i].point /= weights[i];
     fused[i].normal.normalize();
@@ -73,6 +75,7 @@ std::vector<WorldSurface> collect_surface(const maps::Map& map, const std::vecto
     world_from_keyframe.push_back(map.camera_from_world(id).inverse());
   }
 
+  // The keyframes' samples in turn
   for (std::size_t i = 0; i < longest; ++i) {
     for (std::size_t k = 0; k < keyframes.size(); ++k) {
       const auto& surface = map.keyframe(keyframes[k]).surface;

@@ -49,6 +49,8 @@ std::optional<optimize::PosePrior> motion_prior(const geometry::Matrix6d& inform
   const double worth = trust == MotionTrust::kSurfaceOnly ? kSurfaceOnly
                        : trust == MotionTrust::kLikely    ? kLikely
                                                           : kDegenerate;
+
+  // The prior only constrains degenerate directions
   geometry::Matrix6d degenerate = geometry::Matrix6d::Zero();
   for (int i = 0; i < 6 && directions.eigenvalues(i) < limit; ++i) {
     degenerate += worth * directions.eigenvectors.col(i) * directions.eigenvectors.col(i).transpose();

@@ -66,12 +66,14 @@ HalfDepth half_depth(const cv::Mat& depth) {
         high = std::max(high, v);
       }
 
+      // No mean across a depth border
       if (count >= 2 && high - low < same_surface(low)) {
         raw.z[static_cast<std::size_t>(y * raw.width + x)] = sum / static_cast<float>(count);
       }
     }
   }
 
+  // Smoothed among neighbours on the same surface
   HalfDepth smooth = raw;
   const auto read = [&raw](int x, int y) { return raw.at(x, y); };
   for (int y = 0; y < raw.height; ++y) {
@@ -113,6 +115,7 @@ constexpr int kCellsY = 12;
 constexpr int kAzimuths = 8;
 constexpr int kElevations = 4;
 
+// Bin of a normal; near the optical axis all azimuths are one.
 int direction_bin(const Eigen::Vector3f& n) {
   constexpr float kPi = 3.14159265F;
   const float azimuth = (std::atan2(n.y(), n.x()) + kPi) / (2.0F * kPi);

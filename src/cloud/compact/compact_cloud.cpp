@@ -130,6 +130,7 @@ void columns(Io& io, const std::vector<Point*>& points) {
       for (std::size_t k = 0; k < before.size(); ++k) {
         before[k] = static_cast<std::uint8_t>(before[k] + bytes[k * count + i]);
       }
+
       Point& p = *points[i];
       p.g = before[0];
       p.r = static_cast<std::uint8_t>(before[0] + before[1]);
@@ -208,6 +209,8 @@ void list(Io& io, double step_m, Cloud& cloud) {
         cloud.points[i].*axis = static_cast<float>(values[i] * step_m);
     }
   }
+
+  // Colours and normals of all points
   std::vector<Point*> points;
   points.reserve(cloud.points.size());
   for (Point& p : cloud.points) points.push_back(&p);

@@ -44,6 +44,7 @@ class MergeFilter : public Filter {
     output->points.reserve(input->size() + other->cloud->size());
     std::vector<std::size_t> chosen[2];
     const Cloud* parts[2] = {input.get(), other->cloud.get()};
+
     for (std::size_t side = 0; side < 2; ++side) {
       for (std::size_t i = 0; i < parts[side]->size(); ++i) {
         if (!finite((*parts[side])[i])) continue;

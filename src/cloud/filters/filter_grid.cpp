@@ -41,6 +41,7 @@ std::string check_extent(const Cloud& cloud, double leaf) {
     return (((max - min) / l).array().floor() + 2.0).prod() <= kMost && furthest * leaf / l < kMost / 4.0;
   };
   while (!fits(needed)) needed *= 1.1;
+
   const Eigen::Vector3d size = max - min;
   return fmt::format(
       "leaf {:g} m is too small for a cloud of {:.4g} x {:.4g} x {:.4g} m ({:.2g} cells, at most 2.1e9); "

@@ -29,6 +29,8 @@ class NormalsFilter : public Filter {
     if (points->empty()) return points;
     const Eigen::Vector3f viewpoint = viewpoint_of(*input, context);
     const int threads = context.executor != nullptr ? context.executor->threads() : 1;
+
+    // The nearest neighbours, or all within the radius
     pcl::NormalEstimationOMP<Point, pcl::Normal> estimation(static_cast<unsigned int>(threads));
     estimation.setSearchMethod(std::make_shared<pcl::search::KdTree<Point>>());
     estimation.setKSearch(neighbours_);

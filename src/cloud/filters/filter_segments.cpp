@@ -237,6 +237,7 @@ class ClustersFilter : public Filter {
     grid.setSaveLeafLayout(true);
     const auto means = std::make_shared<Cloud>();
     std::vector<std::uint32_t> mean_of(points->size());
+
     for (const auto& [place, indices] : blocks) {
       Cloud part;
       grid.setIndices(indices);

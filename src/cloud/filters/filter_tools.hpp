@@ -74,6 +74,7 @@ CloudPtr select(const Cloud& input, const Keep& keep) {
     output->width = input.width;
     output->height = input.height;
     output->is_dense = false;
+
     for (std::size_t i = 0; i < input.size(); ++i) {
       if (!finite(input[i]) || !keep(i, input[i])) reject(output->points[i]);
     }

@@ -61,7 +61,7 @@ class Fusion {
     if (!views_.covariances.empty()) all.columns.others.push_back({kSigmaColumn, {}});
     add({}, all);
 
-    // As many tiles at a time as memory allows
+    // Tiles that fit into memory together
     const std::size_t most_cells = cells_at_a_time(options_);
     for (std::size_t first = 0, count = 0; first < tiles_.size(); first += count) {
       std::size_t cells = 0;
@@ -248,6 +248,7 @@ class Fusion {
     // Isolated points have too few neighbours of similar normal
     const auto least = static_cast<std::uint32_t>(options_.min_support);
     std::size_t kept = 0;
+
     for (std::size_t i = 0; i < points.size(); ++i) {
       const std::uint32_t s = surfels.of(i);
       if (s != Surfels::kNone && goes[s] != 0) {

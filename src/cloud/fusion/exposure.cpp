@@ -131,6 +131,7 @@ std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell
 
       // Gain that each view needs; outliers count less
       const Eigen::Array3f mean = sum / weight;
+
       for (std::size_t i = first; i < end; ++i) {
         CellColor& s = colors[i];
         Sum& view = of_views[s.view];

@@ -244,6 +244,7 @@ CloudPtr depth_view(const sensor::RgbdFrame& frame, const sensor::Pinhole& camer
   for (int v = 0; v < height; ++v) {
     const float* depth = frame.depth.ptr<float>(v);
     Point* cells = view->points.data() + static_cast<std::ptrdiff_t>(v / kCell) * columns;
+
     for (int u = 0; u < width; ++u) {
       const float z = depth[u];
       if (!(z >= least && z <= most)) continue;

@@ -117,6 +117,7 @@ Grid smooth_inverse_depth(const cv::Mat& depth, int stride, int window, float mi
     const int v = j * stride;
     const float* reference = rows.row(v);
     pass.start(reference);
+
     for (int d = 1; d <= std::min({half, v, rows.height - 1 - v}); ++d) {
       pass.add(rows.row(v - d), rows.row(v + d), reference, static_cast<float>(d) * kSmoothTangent / focal);
     }

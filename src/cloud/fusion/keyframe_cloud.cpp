@@ -40,6 +40,7 @@ float smoothing_share(const cv::Mat& depth, float min_depth, float max_depth) {
       const float least = std::min({row[u - kStep], row[u], row[u + kStep]});
       const float most = std::max({row[u - kStep], row[u], row[u + kStep]});
       if (!(least >= min_depth && most <= max_depth)) continue;
+
       const float w = 1.0F / row[u];
       const float bend = std::abs(1.0F / row[u - kStep] + 1.0F / row[u + kStep] - 2.0F * w);
       bends.push_back(bend / (2.45F * inverse_depth_sigma(w)));

@@ -35,7 +35,7 @@ CloudFrame frame_in(const std::vector<std::string>& comments) {
     const std::size_t begin = comment.find_first_not_of(' ', kKey.size());
     if (begin == std::string::npos) continue;
 
-    // Of text that is not plain, only its up remains
+    // Text that is not plain only keeps its up
     CloudFrame frame{comment.substr(begin, comment.find_last_not_of(" \t\r") + 1 - begin)};
     const bool plain = frame.text.size() <= kLongest &&
                        std::all_of(frame.text.begin(), frame.text.end(),

@@ -138,6 +138,7 @@ core::Result<void> write_obj(const std::filesystem::path& file, const PlyData& m
       return shift == 0.0 ? static_cast<double>(value) : with_shift(value, shift);
     };
     const auto channel = [v](const std::vector<std::uint8_t>& c) { return c[v] / 255.0; };
+
     out.write(fmt::format("v {:.5f} {:.5f} {:.5f} {:.4f} {:.4f} {:.4f}\nvn {:.4f} {:.4f} {:.4f}\n", at(0),
                           at(1), at(2), channel(*red), channel(*green), channel(*blue), at(3), at(4), at(5)));
   }

@@ -52,6 +52,7 @@ std::string finish_fields(PcdHeader& header) {
       case 2:
         field.scalar = t == 'U' ? ScalarType::kUint16 : ScalarType::kInt16;
         break;
+
       case 4:
         field.scalar = t == 'F' ? ScalarType::kFloat32 : t == 'U' ? ScalarType::kUint32 : ScalarType::kInt32;
         break;

@@ -113,6 +113,7 @@ std::vector<Sink> make_columns(const PlyElement& element, PlyData& data) {
     } else {
       data.columns.push_back({property.name, std::vector<float>(count)});
     }
+
     sinks.push_back({property.type, offset, nullptr, nullptr});
     offset += size_of(property.type);
   }
@@ -257,6 +258,7 @@ std::uint64_t read_edges(Body& body, const PlyElement& element, PlyData& data) {
         !to_index(value, data.vertex_count, data.edges[row][first ? 0 : 1])) {
       return body.refuse(fmt::format("vertex index {} is not below {}", value, data.vertex_count));
     }
+
     for (std::size_t k = 0; k < 3 && colored; ++k) {
       constexpr std::array<const char*, 3> kChannels{"red", "green", "blue"};
       if (property.name == kChannels[k]) data.edge_colors[row][k] = to_byte(value);

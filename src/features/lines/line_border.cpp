@@ -19,6 +19,7 @@ bool constant(const cv::Mat& strip) {
   return high - low <= kMaxSpread;
 }
 
+// True if enough pixels differ visibly.
 bool visible_step(const cv::Mat& outside, const cv::Mat& inside, bool either_sign) {
   cv::Mat step;
   if (either_sign) {

@@ -66,6 +66,7 @@ std::vector<cv::Vec4f> run(const LineDetectorOptions& options, const cv::Mat& im
   return lines;
 }
 
+// True if a segment runs within the margin of a side.
 bool at_border(const LineSegment& s, const cv::Rect& region, const LineDetectorOptions& options) {
   const auto margin = static_cast<float>(options.border_px);
   const auto both_below = [&](float a, float b, float limit) {

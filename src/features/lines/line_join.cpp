@@ -89,6 +89,8 @@ LineSegment merged(const LineSegment& a, const LineSegment& b) {
   const float la = a.length();
   const float lb = b.length();
   const Eigen::Vector2f centre = (la * a.middle() + lb * b.middle()) / (la + lb);
+
+  // Scatter of points spread evenly over both
   Eigen::Matrix2f scatter = Eigen::Matrix2f::Zero();
   for (const LineSegment* s : {&a, &b}) {
     const Eigen::Vector2f m = s->middle() - centre;
@@ -96,10 +98,12 @@ LineSegment merged(const LineSegment& a, const LineSegment& b) {
     scatter += s->length() * (m * m.transpose() + h * h.transpose() / 12.0F);
   }
 
+  // Principal direction, as the first segment points
   const float angle = 0.5F * std::atan2(2.0F * scatter(0, 1), scatter(0, 0) - scatter(1, 1));
   Eigen::Vector2f d(std::cos(angle), std::sin(angle));
   if (d.dot(a.end - a.start) < 0.0F) d = -d;
 
+  // Extent of all four ends along it
   float low = 0.0F;
   float high = 0.0F;
   for (const Eigen::Vector2f& p : {a.start, a.end, b.start, b.end}) {

@@ -102,6 +102,8 @@ void align_points(const maps::Map& map, const features::FrameFeatures& frame, co
   }
   if (frame.levels.empty() || frame.patches.size() != frame.points.size()) return;
   const double log_scale = std::log(scale_factor);
+
+  // Shift of the corner against an earlier observation
   for (PointMatch& m : matches) {
     const auto sight = first_sight(map, map.point(m.point), camera, camera_from_world, log_scale);
     if (!sight) continue;

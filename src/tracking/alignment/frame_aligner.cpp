@@ -40,11 +40,14 @@ FrameAligner::FrameAligner(const AlignmentInput& input, const Rigid3& hypothesis
 }
 
 TrackResult FrameAligner::run() {
+  // With a search radius: coarse rounds first
   if (search_radius_px_ > 0.0) {
     for (const AlignmentRound& round : kCoarse) align(round);
     correct_image_motion();
   }
   align_finely();
+
+  // Again without the prior, if measurements contradict it
   if (contradicts_motion_prior()) {
     use_motion_prior_ = false;
     align_finely();
@@ -61,6 +64,7 @@ void FrameAligner::align_finely() {
   align(kFine[2]);
 }
 
+// One round of association and optimisation.
 void FrameAligner::align(const AlignmentRound& round) {
   if (round.rematch) match_landmarks(round);  // points and lines, by projection: e_p and e_l of section 3.2
   associate_surface(round);                   // point to plane
@@ -109,6 +113,8 @@ void FrameAligner::match_landmarks(const AlignmentRound& round) {
   const double radius = round.search_radius_px > 0.0 ? round.search_radius_px : search_radius_px_;
   const AssociationOptions& how = in_.options.association;
   const Rigid3& pose = result_.camera_from_world;
+
+  // Landmarks of the previous round are replaced
   result_.visible_points.clear();
   result_.visible_lines.clear();
   result_.doubtful.clear();
@@ -116,6 +122,8 @@ void FrameAligner::match_landmarks(const AlignmentRound& round) {
   if (in_.options.points) {
     result_.points = match_points(in_.map, in_.local_map.points, features(), in_.camera, pose, radius, how,
                                   &result_.visible_points);
+
+    // Only good matches are worth aligning
     if (how.align && round.reject_outliers)
       align_points(in_.map, features(), in_.camera, pose, how.scale_factor, result_.points);
     problem_.points = point_terms(in_.map, result_.points, features(), how);
@@ -130,6 +138,8 @@ void FrameAligner::match_landmarks(const AlignmentRound& round) {
 
 void FrameAligner::associate_surface(const AlignmentRound& round) {
   if (!in_.options.depth) return;
+
+  // Coarse rounds have wider gates
   SurfaceAssociationOptions how;
   how.max_distance_m = round.max_plane_distance_m;
   how.max_samples = round.surface_samples;
@@ -140,6 +150,8 @@ void FrameAligner::associate_surface(const AlignmentRound& round) {
 
 void FrameAligner::associate_intensity(const AlignmentRound& round) {
   if (!in_.options.photometric || features().photometric == nullptr) return;
+
+  // Terms of the same pyramid level are only updated
   const bool again = intensity_level_ == round.pyramid_level && problem_.photometric &&
                      update_photometric(*problem_.photometric, result_.camera_from_world);
   if (!again) {
@@ -177,6 +189,8 @@ void FrameAligner::constrain_degenerate_directions() {
 
 void FrameAligner::reject_outliers() {
   const std::vector<double> errors = optimize::point_errors(problem_, result_.camera_from_world);
+
+  // Aligned points that do not fit are doubtful
   for (std::size_t i = 0; i < errors.size(); ++i) {
     if (errors[i] > kPointGate && result_.points[i].aligned) result_.doubtful.push_back(result_.points[i]);
   }
