@@ -108,6 +108,7 @@ void empty_patches_at_borders(const cv::Mat& depth, const OrbExtractor& extracto
   std::vector<float> roughness;
   std::vector<std::size_t> asked;
 
+  // Patches that span a depth border
   for (std::size_t i = 0; i < orb.points.size(); ++i) {
     const Eigen::Vector2f& pixel = orb.points[i].pixel;
     const auto reach = static_cast<float>(CornerPatch::kReach) * extractor.sigma(orb.points[i].octave);

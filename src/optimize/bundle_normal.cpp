@@ -48,8 +48,8 @@ double BundleRound::linearise_slot(std::size_t slot, const BundleState& state) {
   Vector6d gradient = Vector6d::Zero();
   double sum = 0.0;
 
+  // Points: normal equations of pose, landmark and both
   for (std::size_t i = equations_.points.slot_begin[slot]; i < equations_.points.slot_begin[slot + 1]; ++i) {
-    // Points: normal equations of pose, landmark and both
     point_terms_[i].world = state.points[at(equations_.points.observations[i].landmark)];
     Eigen::Vector3d r;
     Eigen::Matrix<double, 3, 6> j;
@@ -77,7 +77,7 @@ double BundleRound::linearise_slot(std::size_t slot, const BundleState& state) {
     equations_.points.gradients[i].noalias() = pose.rotation.transpose() * g.head<3>();
   }
 
-  // Lines in the same way
+  // Lines likewise
   LineDerivatives j;
   for (std::size_t i = equations_.lines.slot_begin[slot]; i < equations_.lines.slot_begin[slot + 1]; ++i) {
     const Eigen::Vector4d r = line_rows(line_views_[i], projection_, pose,

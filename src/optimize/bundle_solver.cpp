@@ -94,7 +94,7 @@ const char* BundleRound::iterate(TrustRegion& region, BundleState& state, Bundle
     if (tiny_step(state)) return "the step is zero";
   }
 
-  // Accepted if the gain is near the prediction
+  // Accepted if a share of the predicted gain is real
   const bool settled = std::abs(now - then) <= options_.tolerance * now;
   const double gain = promised > 0.0 ? (now - then) / promised : -1.0;
   if (gain > kLeastGain) {

@@ -70,7 +70,7 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
 
   const TrackedImage image = image_of(frame, features);
 
-  // After a long loss the motion model is not trusted first
+  // After a long loss, relocalisation comes first
   const bool outdated = motion_.outdated();
   std::optional<TrackResult> result = outdated ? relocalise(map, image) : track_with_motion_model(map, image);
   if (!result) result = outdated ? track_with_motion_model(map, image) : relocalise(map, image);
@@ -119,7 +119,7 @@ void Tracker::record(const sensor::RgbdFrame& frame, TrackResult& result) {
   result.continuous = motion_.reliable(frame.stamp);
   result.photometric = result.features->photometric;
 
-  // The pyramid's images are not needed any more
+  // Aligned points are moved; the pyramid is not needed any more
   result.features = without_pyramid(*result.features, result.points, camera_);
   motion_.update(frame.stamp, result);
   result.turn_rate = global_shutter_ ? 0.0 : motion_.turn_rate();

@@ -149,7 +149,7 @@ CloudColumns carry_columns(const Cloud& before, const CloudColumns& columns, con
   // A filter that only chose points keeps their rows
   std::vector<std::size_t> indices = find_all(before, after);
   if (indices.size() != after.size()) {
-    // Moved points: same order, else the nearest point
+    // Moved points: by order, else by the nearest
     if (before.size() == after.size()) return columns;
     indices = finite_indices(before);
     if (indices.size() != after.size()) indices = nearest(before, after);

@@ -251,11 +251,10 @@ core::Result<FusedCloud> FilterChain::run(CloudConstPtr input, CloudColumns colu
 core::Result<CloudPtr> FilterChain::apply(CloudConstPtr input, const FilterContext& context,
                                           std::vector<FilterReport>* reports,
                                           const ChainProgress& progress) const {
+  // Columns only if the caller also takes them back
   const bool columned = context.columns != nullptr && context.made_columns != nullptr;
   auto filtered =
       run(std::move(input), columned ? *context.columns : CloudColumns(), context, reports, progress);
-
-  // Columns only if the caller also takes them back
   if (!filtered) return tl::unexpected<core::Error>(filtered.error());
   if (columned) *context.made_columns = std::move(filtered->columns);
   return std::move(filtered->cloud);

@@ -91,6 +91,7 @@ core::Result<void> PlyTiles::add(const std::filesystem::path& file) {
                                          file.string(), count, reader.remaining() / record_size_));
   }
 
+  // Every file's points, some of the first's as a sample
   const bool first = points_ == 0;
   const std::uint64_t sampled = std::max<std::uint64_t>(1, count / 1000);
   for (std::uint64_t i = 0; i < count; ++i) {
@@ -149,7 +150,7 @@ core::Result<void> PlyTiles::write_waiting() {
   for (auto& [key, tile] : tiles_) {
     if (tile.waiting.empty()) continue;
 
-    // The header is written without the number of points
+    // The header of a new tile is completed in the end
     const std::filesystem::path file = file_of(key);
     std::error_code error;
     const bool begun = std::filesystem::exists(file, error);

@@ -39,12 +39,12 @@ class MergeFilter : public Filter {
     // Both clouds relative to the same shift
     change_shift(*other->cloud, other->shift, context.shift);
 
-    // Finite points of both, the chain's first
     auto output = like(*input);
     output->points.reserve(input->size() + other->cloud->size());
     std::vector<std::size_t> chosen[2];
     const Cloud* parts[2] = {input.get(), other->cloud.get()};
 
+    // Finite points of both, the chain's first
     for (std::size_t side = 0; side < 2; ++side) {
       for (std::size_t i = 0; i < parts[side]->size(); ++i) {
         if (!finite((*parts[side])[i])) continue;

@@ -193,7 +193,7 @@ class ClustersFilter : public Filter {
   }
 
  private:
-  // Groups of points connected by steps of at most this length.
+  // Groups of points connected by steps of at most `distance_m`.
   static std::vector<pcl::Indices> clusters_of(const CloudConstPtr& points, double distance_m,
                                                int min_points) {
     const auto tree = std::make_shared<pcl::search::KdTree<Point>>(false);
@@ -228,9 +228,8 @@ class ClustersFilter : public Filter {
       indices->push_back(static_cast<pcl::index_t>(i));
     }
 
-    pcl::VoxelGrid<Point> grid;
-
     // Means of cells; every point knows the mean of its cell
+    pcl::VoxelGrid<Point> grid;
     grid.setInputCloud(points);
     grid.setLeafSize(leaf, leaf, leaf);
     grid.setDownsampleAllData(false);  // positions alone

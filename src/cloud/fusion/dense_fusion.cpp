@@ -245,10 +245,10 @@ class Fusion {
     surfels.fit_planes();
     if (options_.plane_projection) surfels.project(points);
 
-    // Isolated points have too few neighbours of similar normal
     const auto least = static_cast<std::uint32_t>(options_.min_support);
     std::size_t kept = 0;
 
+    // Isolated points have too few neighbours of similar normal
     for (std::size_t i = 0; i < points.size(); ++i) {
       const std::uint32_t s = surfels.of(i);
       if (s != Surfels::kNone && goes[s] != 0) {

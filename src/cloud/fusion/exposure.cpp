@@ -129,9 +129,9 @@ std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell
         weight += s.weight;
       }
 
-      // Gain that each view needs; outliers count less
       const Eigen::Array3f mean = sum / weight;
 
+      // Gain that each view needs; outliers count less
       for (std::size_t i = first; i < end; ++i) {
         CellColor& s = colors[i];
         Sum& view = of_views[s.view];

@@ -227,7 +227,7 @@ CloudPtr depth_view(const sensor::RgbdFrame& frame, const sensor::Pinhole& camer
   const auto least = static_cast<float>(min_depth_m), most = static_cast<float>(max_depth_m);
   const int columns = (camera.width + kCell - 1) / kCell, rows = (camera.height + kCell - 1) / kCell;
 
-  // Cells without depth are not numbers
+  // NaN in cells without depth
   Point none;
   none.x = none.y = none.z = none.normal_x = none.normal_y = none.normal_z = kNan;
   none.r = none.g = none.b = 0;

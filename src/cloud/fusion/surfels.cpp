@@ -61,10 +61,10 @@ void Surfels::add(const FusedPoint& point, std::uint32_t& surfel_of_point) {
     (last == kNone ? first : next_[last]) = at;
   }
 
-  // Weighted moments of positions, normals and noise
   Surfel& surfel = surfels_[at];
   const Eigen::Vector3f offset = (position - centre(block)).cast<float>();
 
+  // Weighted moments of positions, normals and noise
   surfel.normal_sum += point.weight * normal;
   surfel.first += point.weight * offset;
   surfel.second += point.weight * offset * offset.transpose();

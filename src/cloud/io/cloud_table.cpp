@@ -72,7 +72,7 @@ Meaning meaning_of(const std::string& name) {
       {"robot", Meaning::kRobot},
   }};
 
-  // Names as many programs write them
+  // Names regardless of case
   const std::string lower = core::lower(name);
   for (const auto& [known, meaning] : kNames) {
     if (lower == known) return meaning;

@@ -112,7 +112,7 @@ PlyData dressed(const std::vector<Eigen::Vector3f>& vertices, const pcl::Polygon
     }
   }
 
-  // Vertices by columns, and triangles with all corners left
+  // Columns, and triangles of the remaining vertices
   PlyData result;
   const std::array<const char*, 6> names{"x", "y", "z", "nx", "ny", "nz"};
   for (std::size_t k = 0; k < 6; ++k) result.add(names[k], std::move(xyz_normal[k]));

@@ -169,7 +169,7 @@ void set_binary(CloudBuilder& builder, std::size_t row, const PcdHeader& header,
                 const std::uint8_t* bytes) {
   const PcdField& field = header.fields[f];
 
-  // Colour is in the bits, also of a float
+  // Packed colour: the bits, even of a float
   if (field.meaning == Meaning::kPackedColor) {
     std::uint32_t bits = 0;
     std::memcpy(&bits, bytes, 4);
@@ -227,7 +227,7 @@ class PcdWords {
       begin = end + 1;
     }
 
-    // Commas separate the values of a point; others are decimal
+    // Commas are decimal unless the word is a point
     decimal_comma_ = pieces_.size() > 1 && pieces_.size() != a_point_;
     return true;
   }
@@ -282,7 +282,7 @@ std::string read_compressed(ByteReader& reader, const PcdHeader& header, CloudBu
   std::memcpy(&packed_size, sizes, 4);
   std::memcpy(&size, sizes + 4, 4);
 
-  // Before memory is allocated, since the file may be damaged
+  // Sizes are compared before memory is allocated
   if (size != header.points * header.record) {
     return fmt::format("compressed data hold {} bytes, {} points need {}", size, header.points,
                        header.points * header.record);

@@ -118,7 +118,7 @@ std::vector<Sink> make_columns(const PlyElement& element, PlyData& data) {
     offset += size_of(property.type);
   }
 
-  // Addresses only now, since the list grew until here
+  // Addresses of the columns, once all exist
   for (std::size_t i = 0; i < sinks.size(); ++i) {
     auto& values = data.columns[i].values;
     if (auto* floats = std::get_if<std::vector<float>>(&values)) sinks[i].floats = floats->data();
@@ -251,7 +251,7 @@ std::uint64_t read_edges(Body& body, const PlyElement& element, PlyData& data) {
   data.edges.resize(count);
   data.edge_colors.resize(colored ? count : 0);
 
-  // Edges between vertices that exist
+  // Edges must join vertices that exist
   return read_records(body, element, [&](std::uint64_t row, const PlyProperty& property, double value) {
     const bool first = property.name == "vertex1";
     if ((first || property.name == "vertex2") &&

@@ -109,7 +109,7 @@ core::Result<PlyHeader> read_ply_header(ByteReader& reader) {
     words >> keyword;
     std::string problem;
 
-    // Only here is the header complete
+    // The header is complete
     if (keyword == "end_header") {
       if (!format) return core::input_error("PLY header has no format line");
       return header;

@@ -123,7 +123,7 @@ void FrameAligner::match_landmarks(const AlignmentRound& round) {
     result_.points = match_points(in_.map, in_.local_map.points, features(), in_.camera, pose, radius, how,
                                   &result_.visible_points);
 
-    // Only good matches are worth aligning
+    // Corners are aligned once outliers are rejected
     if (how.align && round.reject_outliers)
       align_points(in_.map, features(), in_.camera, pose, how.scale_factor, result_.points);
     problem_.points = point_terms(in_.map, result_.points, features(), how);
