@@ -15,7 +15,7 @@ float depth_roughness(const cv::Mat& depth, int x, int y, int reach, int step) {
   const float here = depth.at<float>(y, x);
   if (!(here > 0.0F)) return kUnknown;
 
-  // Inverse depth is affine on a plane. Opposite pixels together leave the mean apart from both slopes.
+  // Inverse depth is affine on a plane. Sums of opposite pixels give the mean without both slopes.
   float n = 0.0F, sum = 0.0F, squares = 0.0F;
 
   float wx = 0.0F, wy = 0.0F, xx = 0.0F, yy = 0.0F, xy = 0.0F;

@@ -22,7 +22,7 @@ struct Corner {
   int score = 0;  ///< the largest threshold at which FAST still finds it, grey values
 };
 
-/// Which cell of a grid over a width x height area a corner lies in.
+/// Cells of a grid over an area of width x height.
 class Cells {
  public:
   Cells(int width, int height)

@@ -16,7 +16,8 @@ constexpr std::size_t kPatchRows = 2 * kHalfPatch + 1;
 constexpr std::size_t kPatchColumns = 32;  // the last one weighs nothing
 
 /// Weights of the patch's pixels in its first moments. u^2 + v^2 <= r (r + 1) is the same seen along x and
-/// along y; rounding the width of each row, as usual, is not, and bends orientations by several degrees.
+/// along y; rounding the width of each row, as usual, is not symmetric, and biases orientations by several
+/// degrees.
 struct Moments {
   std::array<std::int16_t, kPatchRows * kPatchColumns> x{};
   std::array<std::int16_t, kPatchRows * kPatchColumns> y{};

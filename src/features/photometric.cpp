@@ -92,7 +92,7 @@ float interpolated(const cv::Mat& image, float x, float y) {
   return t + sy * (l - t);
 }
 
-/// Takes out the samples whose surroundings are rougher than most: a border is among them.
+/// Removes the samples whose surroundings are rougher than most: they contain a border.
 void keep_smooth(const std::vector<float>& roughness, std::vector<PhotometricSample>& samples) {
   const float limit = roughness_limit(roughness);
   std::size_t kept = 0;

@@ -29,7 +29,7 @@ void subtract_products(const double* y, int unknowns, const std::vector<Target>&
 
 }  // namespace
 
-/// Takes the landmarks that a free slot sees out of its row of the equations.
+/// Eliminates the landmarks that a free slot sees from its row of the equations.
 template <typename Family>
 void SchurComplement::eliminate(const Family& family, std::size_t slot) {
   const int row = static_cast<int>(slot);

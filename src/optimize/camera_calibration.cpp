@@ -234,7 +234,7 @@ bool adjust(const CalibrationProblem& problem, CameraUnknowns& unknowns, ceres::
   return summary.IsSolutionUsable();
 }
 
-/// The cost around where the unknowns are, poses and points eliminated.
+/// The quadratic cost around the present unknowns, with poses and points eliminated.
 std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, CameraUnknowns& unknowns,
                                          ceres::Problem& ceres_problem) {
   ceres::Problem::EvaluateOptions order;

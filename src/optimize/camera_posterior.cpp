@@ -111,7 +111,7 @@ Case combined(const Measured& measured, const CameraPrior& prior,
   for (std::size_t g = 0; g < kCameraGroups; ++g)
     one.log_weight += std::log(std::max(1e-300, wrong[g] ? prior.wrong[g] : 1.0 - prior.wrong[g]));
 
-  // No camera reads a picture before it is taken: a wrong readout has half a normal distribution.
+  // A readout time is not negative: the prior of a wrong one is half a normal distribution.
   double& readout = one.mean[kReadout];
   if (wrong[kReadoutGroup])
     one.log_weight += std::log(2.0) + log_normal_cdf(readout / std::sqrt(one.covariance(kReadout, kReadout)));

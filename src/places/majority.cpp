@@ -69,7 +69,7 @@ std::vector<int> assign(const std::vector<Descriptor256>& centres, std::size_t c
   return member_of;
 }
 
-/// Centres without members and repeated ones go.
+/// Removes centres without members, and repeated ones.
 void drop_idle(std::vector<Descriptor256>& centres, const std::vector<BitCounter>& counters) {
   std::vector<Descriptor256> kept;
   for (std::size_t c = 0; c < centres.size(); ++c) {

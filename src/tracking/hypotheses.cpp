@@ -71,7 +71,7 @@ Tracker::PoseHypotheses Tracker::pose_hypotheses(const maps::Map& map, const sen
 }
 
 /// In front of a bare wall thumbnails fit anywhere, and the motion model lags behind: fine texture shows
-/// which hypothesis is the best, or how far to the side of it the camera looks.
+/// which hypothesis is the best, or how far to the side of it the camera points.
 void Tracker::rank_by_intensity(const maps::Map& map, const PhotometricView& view,
                                 PoseHypotheses& hypotheses) const {
   constexpr std::size_t kCoarse = 1;
@@ -105,7 +105,7 @@ void Tracker::rank_by_intensity(const maps::Map& map, const PhotometricView& vie
   hypotheses.searched = true;
 }
 
-/// Terms that bear a pose out, each family with its weight.
+/// Terms that confirm a pose, each family with its weight.
 double Tracker::support(const TrackResult& result) const {
   const optimize::PoseSummary& seen = result.estimate;
   const optimize::PoseSolverOptions& weights = options_.solver;
@@ -137,8 +137,8 @@ std::optional<TrackResult> Tracker::track_with_motion_model(const maps::Map& map
   std::optional<TrackResult> best;
   for (const Rigid3& hypothesis : hypotheses.camera_from_world) {
     TrackResult attempt = align(map, image, hypothesis, motion_.search_radius_px());
-    // Among look-alikes, the keys of a keyboard, wrong matches of the wide search can pull the pose further
-    // than the fine rounds look: the right ones around the hypothesis would never be tried.
+    // Among similar landmarks, such as the keys of a keyboard, wrong matches of the wide search can pull the
+    // pose beyond the reach of the fine rounds: the right ones around the hypothesis would never be tried.
     if (jumps(image.frame.stamp, attempt.camera_from_world)) {
       TrackResult near = align(map, image, hypothesis, 0.0);
       if (tracked(near) && !(tracked(attempt) && support(attempt) > kClearly * support(near)))

@@ -108,7 +108,7 @@ LocalMap build_local_map(const maps::Map& map, KeyframeId reference, const Local
   const auto wanted = static_cast<std::size_t>(options.keyframes);
   for (const KeyframeId id : map.neighbours(reference, wanted - 1)) append_unique(local.keyframes, id);
 
-  // Poses of other components say nothing of where their keyframes lie.
+  // Poses of other components are in another frame.
   const KeyframeId root = maps::root_of(map, reference);
 
   const geometry::Rigid3& reference_from_world = map.camera_from_world(reference);

@@ -14,7 +14,7 @@ namespace {
 constexpr double kDegenerate = 2500.0;  // information of a standard deviation of 2 cm
 constexpr double kLikely = 4e4;         // of 5 mm
 constexpr double kSurfaceOnly = 1e7;    // of 0.3 mm
-// Squared, in a direction that they hold; they are good to 3 degrees.
+// Smallest squared share of the normals along a constrained direction; normals are exact to 3 degrees.
 constexpr double kShareOfNormals = 0.004;
 const Vector6d kDirectionScale = (Vector6d() << 1.0, 1.0, 1.0, 0.5, 0.5, 0.5).finished();
 

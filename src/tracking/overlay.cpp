@@ -142,7 +142,7 @@ void draw_points(cv::Mat& image, const features::FrameFeatures& features, const 
   }
 }
 
-/// Words with a measure of their own size: 1 at 640 px width.
+/// Writes text of a size relative to the image: 1 at 640 px width.
 class Writer {
  public:
   explicit Writer(cv::Mat& image) : image_(image), scale_(std::max(0.25, image.cols / 640.0)) {}

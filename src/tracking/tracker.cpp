@@ -58,7 +58,7 @@ void TrackerOptions::declare(core::OptionTable& table) {
 Tracker::Tracker(const TrackerOptions& options, const sensor::Pinhole& camera)
     : options_(options), camera_(camera) {}
 
-/// Gives the motion model what is known of this frame besides its pictures.
+/// Passes odometry and inertial measurements of the frame to the motion model.
 void Tracker::sense(const sensor::RgbdFrame& frame) {
   motion_.set_odometry(frame.odometry);
   if (sensor_) motion_.set_sensed(sensor_(motion_.last_stamp(), frame.stamp));

@@ -54,7 +54,7 @@ core::Result<void> PlyTiles::take_layout(const std::filesystem::path& file, cons
                 : refused("has other properties than the first cloud; filter it by itself");
   }
 
-  // Where x, y and z are in a record.
+  // Offsets of x, y and z within a record.
   int found = 0;
   for (const PlyProperty& property : properties) {
     if (property.list)

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder beside the output that is gone when this is.
+/// A folder next to the output, removed together with this object.
 class TileFolder {
  public:
   explicit TileFolder(const fs::path& output)

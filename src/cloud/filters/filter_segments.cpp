@@ -211,8 +211,8 @@ class ClustersFilter : public Filter {
     return clusters;
   }
 
-  /// Groups the means of cells; what belongs to a mean goes with it. Block by block: however far the cloud
-  /// reaches, no grid has more cells than pcl::VoxelGrid can count.
+  /// Clusters the means of cells; points follow their mean. Block by block: however far the cloud reaches, no
+  /// grid has more cells than pcl::VoxelGrid can count.
   [[nodiscard]] std::vector<pcl::Indices> clusters_of_cells(const CloudConstPtr& points, double distance_m,
                                                             int min_points) const {
     constexpr float kBlock = 64.0F;  // cells along each side

@@ -112,7 +112,7 @@ CloudPtr filtered_by(PclFilter& filter, const CloudConstPtr& input) {
   return output;
 }
 
-/// The finite points as a list of the caller's own: what PCL's searches and grids can be given without harm.
+/// The finite points as a new list, as PCL's searches and grids need them.
 inline CloudPtr finite_list(const Cloud& input) {
   auto output = like(input);
   output->points.reserve(input.size());

@@ -7,8 +7,7 @@
 namespace plumbline::cloud {
 namespace {
 
-/// The frame after the motion: only what is up in it is known, if it is one of the two directions with a
-/// name.
+/// The frame after the motion: only its up axis is known, and only if that is z or -y.
 CloudFrame moved_frame(const CloudFrame& frame, const Eigen::Matrix3d& rotation) {
   constexpr double kSame = 1e-6;
   const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();

@@ -122,8 +122,8 @@ class Fusion {
     return {};
   }
 
-  /// Lays the views into the voxels of the tiles from `first` on, a few views at a time: each is read once
-  /// for all of these tiles, and every tile takes the views in their order. Beside that the next views are
+  /// Inserts the views into the voxels of the tiles from `first` on, a few views at a time: each is read once
+  /// for all of these tiles, and every tile takes the views in their order. Meanwhile the next views are
   /// measured.
   core::Result<void> fill(std::size_t first, std::vector<VoxelMap>& voxels) {
     constexpr std::size_t kViewsAtATime = 2;
@@ -181,8 +181,8 @@ class Fusion {
     return {};
   }
 
-  /// Estimate for all tiles, from the first ones and with some reserve: it costs nothing until it is used,
-  /// while a growing list would be there twice.
+  /// Estimate for all tiles, from the first ones and with some reserve: reserved memory costs nothing until
+  /// it is used, while a growing list would exist twice.
   [[nodiscard]] std::size_t expected_points(const std::vector<VoxelMap>& first_tiles) const {
     constexpr double kReserve = 1.2;
     std::size_t voxels = 0, cells = 0, all_cells = 0;

@@ -34,8 +34,8 @@ std::size_t count_colored(const std::vector<ColorCell>& view) {
       std::count_if(view.begin(), view.end(), [](const auto& cell) { return cell.points >= kFewestPoints; }));
 }
 
-/// Cell by cell, those that two views or more saw in colour. There are thousands for each view, so the list
-/// is allocated once, and sorted and thinned in place.
+/// Colours of the cells that at least two views saw, cell by cell. There are thousands for each view, so the
+/// list is allocated once, and sorted and thinned in place.
 std::vector<CellColor> shared_colors(const std::vector<std::vector<ColorCell>>& views) {
   std::size_t count = 0;
   for (const auto& view : views) count += count_colored(view);

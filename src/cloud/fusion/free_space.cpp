@@ -74,7 +74,7 @@ void count(const std::vector<std::uint32_t>& asked, const std::vector<Eigen::Vec
 
 Verdict judge(const Votes& v) {
   const int free = v[Evidence::kFree], surface = v[Evidence::kSurface], hidden = v[Evidence::kHidden];
-  // One view against another is enough when no third one knows better.
+  // A single view through the place only decides against a single view of a surface.
   if (free > 0 && 2 * free >= surface && (free > 1 || surface < 2)) return Verdict::kGoes;
   if (hidden >= 3 && 3 * surface <= hidden) return Verdict::kHardlySeen;
   return free > 0 ? Verdict::kDoubtful : Verdict::kStays;
@@ -107,7 +107,7 @@ class Surroundings {
     for (std::uint32_t s = 0; s < positions.size(); ++s) cells_[pack_cell(cell(s))].push_back(s);
   }
 
-  /// True if at least half of the certain points within the radius go.
+  /// True if at least half of the certain points within the radius are removed.
   [[nodiscard]] bool go(std::uint32_t surfel, const std::vector<Verdict>& verdicts) const {
     std::size_t going = 0;
     std::size_t staying = 0;

@@ -37,7 +37,7 @@ void cut(const Cells::iterator& begin, const Cells::iterator& end, const Eigen::
   const auto middle = begin + static_cast<std::ptrdiff_t>(count / 2);
   std::nth_element(begin, middle, end, by_axis);
 
-  // Both sides must get something: the cut lies below the median, unless that is the lowest plane.
+  // Neither side may be empty: the cut is below the median, unless that is the lowest plane.
   const int at = std::max((*middle)[axis], box.min()[axis] + 1);
   const auto border =
       std::partition(begin, end, [axis, at](const Eigen::Vector3i& cell) { return cell[axis] < at; });

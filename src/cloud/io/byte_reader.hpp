@@ -22,7 +22,7 @@ class ByteReader {
   }
 
   [[nodiscard]] bool open() const { return open_; }
-  /// Bytes of the file that were not handed out yet.
+  /// Bytes of the file that were not read yet.
   [[nodiscard]] std::uint64_t remaining() const { return size_ - given_; }
 
   /// The next `count` bytes, valid until the next call; nullptr when the file does not have them.

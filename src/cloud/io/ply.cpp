@@ -141,7 +141,7 @@ void divert_positions(const PlyElement& element, bool ascii, const PlyData& data
   }
 }
 
-/// Back into the columns, less a shift.
+/// Stores the positions in the columns, with a shift subtracted.
 void store_positions(const WidePositions& wide, const std::vector<Sink>& sinks, PlyData& data) {
   for (std::size_t axis = 0; axis < wide.size(); ++axis) {
     if (wide[axis].empty()) continue;

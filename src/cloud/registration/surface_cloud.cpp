@@ -14,7 +14,7 @@
 namespace plumbline::cloud {
 namespace {
 
-/// The way a surface faces, and the block that a point lies in.
+/// Direction that a surface faces, and the block of a point.
 using Part = std::array<int, 4>;
 
 Part part_of(const SurfacePoint& p, float block_m) {

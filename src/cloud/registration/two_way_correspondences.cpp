@@ -18,7 +18,7 @@ SurfacePoint moved(const SurfacePoint& point, const Eigen::Matrix4f& target_from
 
 }  // namespace
 
-/// Some of the points, spread over the cloud, say how all have moved.
+/// The motion of all points, from some that are spread over the cloud.
 Eigen::Matrix4f TwoWayCorrespondences::source_from_moved() const {
   constexpr std::size_t kEnough = 64;
   const SurfaceCloud& source = *source_.cloud();

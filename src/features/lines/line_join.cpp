@@ -11,7 +11,7 @@ namespace {
 constexpr float kDuplicateOffset = 1.0F;  // px: overlapping parallels nearer than this are one edge
 constexpr float kSameDirection = 0.8F;    // cosine; opposite steps are the two edges of a thin line
 
-// A segment with what the pairwise tests need again and again.
+// A segment with the quantities that the pairwise tests need.
 struct Piece {
   LineSegment segment;
   Eigen::Vector2f direction;

@@ -118,7 +118,7 @@ Lsd::Lsd(const cv::Mat& image, float min_gradient, bool exact)
   }
 
   for (std::size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
-  // In front of a white wall the faint edges are all there is, in a busy scene they only cost: whole bins are
+  // Faint edges are needed in front of a white wall, but only cost time in a busy scene: whole bins are
   // taken, strongest first, until the share is reached, but strong ones always.
   const auto strong = static_cast<std::size_t>(kBins - static_cast<int>(kStrongGradient * kBinsPerLevel));
 

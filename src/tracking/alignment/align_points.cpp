@@ -61,7 +61,7 @@ std::optional<Sight> sight_of(const maps::Map& map, const maps::Observation& see
 }
 
 /// The first keyframe that saw the landmark from a direction and at a distance not too different: newer ones
-/// were aligned with older ones, and add up what each is off.
+/// were aligned with older ones and accumulate their errors.
 std::optional<Sight> first_sight(const maps::Map& map, const maps::MapPoint& point,
                                  const sensor::Pinhole& camera, const geometry::Rigid3& camera_from_world,
                                  double log_scale) {

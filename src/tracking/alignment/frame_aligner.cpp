@@ -181,7 +181,7 @@ void FrameAligner::constrain_degenerate_directions() {
   if (!in_.options.motion_prior) return;
   MotionTrust trust = MotionTrust::kUnknown;
   if (use_motion_prior_ && surface_only_) trust = MotionTrust::kSurfaceOnly;
-  // Wheels slip: beside features they are worth less.
+  // Wheels slip: with features in view they count less.
   if (use_motion_prior_ && !surface_only_ && in_.motion.reliable(frame().stamp) && !in_.motion.knows_wheels())
     trust = MotionTrust::kLikely;
   problem_.prior = motion_prior(result_.estimate.information, predicted_, trust);

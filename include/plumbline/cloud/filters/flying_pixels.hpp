@@ -22,7 +22,7 @@ namespace plumbline::cloud {
 /// program's own over the sensor's noise (docs/method/features.md); one pass over the image.
 ///
 /// For organised clouds, metres; filter() throws pcl::UnorganizedPointCloudException for others that have
-/// points. Neighbours are looked at among all points, indices given or not.
+/// points. Neighbours are searched among all points, with or without indices.
 template <typename PointT>
 class FlyingPixels : public ChoosingFilter<PointT> {
  public:
