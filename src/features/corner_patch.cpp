@@ -56,6 +56,7 @@ bool make_template(const CornerPatch& patch, Template& to) {
     to.value[k] -= mean;
     to.dx[k] -= mean_x;
     to.dy[k] -= mean_y;
+
     normal(0, 0) += to.dx[k] * to.dx[k];
     normal(0, 1) += to.dx[k] * to.dy[k];
     normal(0, 2) += to.dx[k] * to.value[k];
@@ -167,6 +168,7 @@ std::optional<Eigen::Vector2f> align_patch(const CornerPatch& patch, const cv::M
       return at;
     }
 
+    // The step moves the patch, scaled by its gain
     const Eigen::Vector3f step = sought.inverse * slope;
     gain += step.z();
     const Eigen::Vector2f moved = level_from_patch * step.head<2>() / std::max(kLeastGain, gain);

@@ -46,6 +46,7 @@ float depth_roughness(const cv::Mat& depth, int x, int y, int reach, int step) {
   const float det = xx * yy - xy * xy;
   if (n < kFewest || !(det > 0.0F)) return kUnknown;
 
+  // Residual about the plane, relative to the sensor's noise
   const float along_x = (yy * wx - xy * wy) / det, along_y = (xx * wy - xy * wx) / det;
   const float rest = squares - sum * sum / n - along_x * wx - along_y * wy;
   const float noise = static_cast<float>(sensor::depth_sigma(static_cast<double>(here))) / here;

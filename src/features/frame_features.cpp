@@ -231,6 +231,7 @@ FrameFeatures FeatureExtractor::extract(const sensor::RgbdFrame& frame) const {
   FrameFeatures result;
   if (frame.gray.empty()) return result;
 
+  // Corners with their depth and slant
   if (options_.points) {
     OrbFeatures orb = orb_.extract(frame.gray, valid_region(frame.gray));
     result.slants.reserve(orb.points.size());

@@ -35,6 +35,7 @@ float continuous_depth(const cv::Mat& depth, int x, int y, const Surroundings& a
   const int near = around.near_px, far = around.far_px;
   float sum = 1.0F / here;
 
+  // Opposite pixels on four rings
   int count = 1;
   for (const int r : {near / 2, near, (near + far) / 2, far}) {
     for (const auto& [dx, dy] : {std::pair{1, 0}, {0, 1}, {1, 1}, {1, -1}}) {

@@ -101,6 +101,7 @@ Eigen::Vector4d line_rows(const LineView& seen, const Eigen::Matrix3d& projectio
   derivatives->by_pose.leftCols<3>().noalias() = -(by_n * v);
   derivatives->by_pose.rightCols<3>().noalias() = -(by_n * geometry::skew(line.n)) - by_v * v;
 
+  // Derivatives by the line in the world
   Rows46 by_world;  // n_c = R n_w + [t]x R v_w, v_c = R v_w
   by_world.leftCols<3>().noalias() = by_n * camera_from_world.rotation;
   by_world.rightCols<3>().noalias() =

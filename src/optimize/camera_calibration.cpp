@@ -257,6 +257,7 @@ std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, Came
 
   if (!ceres_problem.Evaluate(order, &evidence.cost, &residuals, nullptr, &crs)) return std::nullopt;
 
+  // Jacobian by the camera, then by all other unknowns
   const Eigen::SparseMatrix<double> jacobian = Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(
       crs.num_rows, crs.num_cols, static_cast<int>(crs.values.size()), crs.rows.data(), crs.cols.data(),
       crs.values.data());
@@ -278,6 +279,7 @@ std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, Came
 
   if (!alone.allFinite()) return std::nullopt;
 
+  // Gradient and information of each block of time
   std::map<int, EvidenceBlock> blocks;
   Eigen::Index row = 0;
   for (const CalibrationObservation& o : problem.observations) {

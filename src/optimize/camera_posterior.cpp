@@ -99,6 +99,7 @@ Case combined(const Measured& measured, const CameraPrior& prior,
         std::pow((is_wrong ? prior.wrong_sigma : prior.right_sigma)[static_cast<Eigen::Index>(u)], 2);
   }
 
+  // Kalman update of the prior by the evidence
   const CameraCovariance spread = measured.covariance + CameraCovariance(variance.asDiagonal());
   const Eigen::LLT<CameraCovariance> factor(spread);
   const CameraChange off = measured.mean - prior.mean;

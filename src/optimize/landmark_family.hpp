@@ -73,6 +73,7 @@ struct LandmarkFamily {
       by_landmark[next[static_cast<std::size_t>(observations[i].landmark)]++] = static_cast<int>(i);
     }
 
+    // Memory for a linearisation
     cross.resize(observations.size());
     square.resize(observations.size());
     gradients.resize(observations.size());

@@ -81,6 +81,7 @@ PLUMBLINE_CLONES void look(const PhotometricTerm* terms, std::size_t count, cons
     std::memcpy(&y, at.y + i, sizeof y);
     std::memcpy(&z, at.z + i, sizeof z);
 
+    // Projection; places outside the image become pixel 0
     const Floats in_x = v.r[0][0] * x + (v.r[0][1] * y + v.r[0][2] * z) + v.t[0];
     const Floats in_y = v.r[1][0] * x + (v.r[1][1] * y + v.r[1][2] * z) + v.t[1];
     const Floats in_z = v.r[2][0] * x + (v.r[2][1] * y + v.r[2][2] * z) + v.t[2];
@@ -198,6 +199,7 @@ PhotometricSums sum_photometric(const PhotometricFamily& family, const Rigid3& c
                     static_cast<float>(loss)};
   PhotometricSums sums;
 
+  // Blocks are added in double precision
   for_blocks(family, camera_from_world, [&](std::size_t first, std::size_t count, const float* seen) {
     Sums block;
     sum_block(family.terms.data() + first, seen, count, scale, block);

@@ -71,6 +71,7 @@ std::vector<double> selected_inverse(const Sparse& l) {
       }
     }
 
+    // Entries below the diagonal, then the diagonal
     double rest = 1.0 / value[diagonal];
     for (int p = diagonal + 1; p < end; ++p) {
       place[static_cast<std::size_t>(row[p])] = -1;

@@ -103,6 +103,8 @@ void Database::divide(Word word) {
       weights_[child] = vocabulary_.weight(words[i]);
       if (vocabulary_.overfull(words[i])) overfull_.push_back(words[i]);
     }
+
+    // The feature and its mass move to the new word
     index_[child].push_back(entries[i]);
     seen_[at(entries[i].slot)].mass += weights_[child] - old_weight;
   }
@@ -130,6 +132,7 @@ Database::Scores Database::query(const FrameFeatures& image) const {
   std::vector<Word> words;
   words.reserve(image.descriptors.size() + image.lines.size());
 
+  // The image as a vector of weighted words
   for (const auto& d : image.descriptors) words.push_back(vocabulary_.word(Kind::kPoint, d));
   for (const auto& l : image.lines) words.push_back(vocabulary_.word(Kind::kLine, l.descriptor));
   std::sort(words.begin(), words.end());
@@ -146,6 +149,7 @@ Database::Scores Database::query(const FrameFeatures& image) const {
     first = last;
     if (!(weight > 0.0) || entries.size() > kCommon) continue;
 
+    // Sum of the smaller share of each common word
     for (std::size_t i = 0; i < entries.size();) {
       const std::int32_t slot = entries[i].slot;
       const std::size_t begin = i;
@@ -184,6 +188,7 @@ std::vector<Hit> Database::Scores::best(std::size_t count, const std::function<b
     const auto block =
         std::min<std::ptrdiff_t>(slots.end() - sorted, static_cast<std::ptrdiff_t>(2 * count + 16));
     std::partial_sort(sorted, sorted + block, slots.end(), better);
+
     for (const auto end = sorted + block; sorted != end; ++sorted) {
       const KeyframeId id = database_->keyframes_[at(*sorted)];
       if (hits.size() < count && (!allowed || allowed(id))) {

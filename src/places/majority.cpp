@@ -123,6 +123,7 @@ Clusters k_majority(const std::vector<Descriptor256>& descriptors, int k, int it
   Distances distances(descriptors);
   clusters.centres = first_centres(descriptors, k, seed, distances);
 
+  // Bits of the members of each centre are counted
   for (int round = 0; round < iterations; ++round) {
     clusters.member_of = assign(clusters.centres, descriptors.size(), distances);
     std::vector<BitCounter> counters(clusters.centres.size());
@@ -130,6 +131,7 @@ Clusters k_majority(const std::vector<Descriptor256>& descriptors, int k, int it
       counters[static_cast<std::size_t>(clusters.member_of[i])].add(descriptors[i]);
     }
 
+    // Centres become the majority of their members
     const std::vector<Descriptor256> before = clusters.centres;
     for (std::size_t c = 0; c < counters.size(); ++c) clusters.centres[c] = counters[c].majority();
     drop_idle(clusters.centres, counters);

@@ -111,6 +111,7 @@ LocalMap build_local_map(const maps::Map& map, KeyframeId reference, const Local
   // Poses of other components are in another frame.
   const KeyframeId root = maps::root_of(map, reference);
 
+  // Recent keyframes that may overlap
   const geometry::Rigid3& reference_from_world = map.camera_from_world(reference);
   for (std::int32_t index = reference.index - 1; index >= 0 && index > reference.index - 40; --index) {
     if (local.keyframes.size() >= wanted) break;
@@ -122,6 +123,7 @@ LocalMap build_local_map(const maps::Map& map, KeyframeId reference, const Local
     }
   }
 
+  // Landmarks of all, surfaces of overlapping keyframes
   local.points = map.points_seen_by(local.keyframes);
   local.lines = map.lines_seen_by(local.keyframes);
   std::vector<KeyframeId> dense;

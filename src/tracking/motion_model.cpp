@@ -37,6 +37,7 @@ void MotionModel::update(double stamp, const TrackResult& result) {
   const double dt = stamp - stamp_;
   dead_reckoning_s_ = result.dead_reckoned && valid_ ? dead_reckoning_s_ + dt : 0.0;
 
+  // Velocity between consecutive frames
   if (continuous() && dt > 1e-4 && dt < 0.5) {
     const bool known = reliable(stamp);
     const geometry::Vector6d before = velocity_;

@@ -106,6 +106,7 @@ std::optional<Relocalisation> relocalise(const maps::Map& map,
     const int count = static_cast<int>(inliers.size());
     if (!solved || count < min_inliers || (best && best->inliers >= count)) continue;
 
+    // Refined with all inliers
     const Eigen::Vector3d r(rotation[0], rotation[1], rotation[2]);
     const geometry::Rigid3 start(geometry::exp_so3(r),
                                  Eigen::Vector3d(translation[0], translation[1], translation[2]));

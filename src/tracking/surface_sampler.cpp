@@ -144,6 +144,7 @@ std::vector<SurfaceCandidate> candidates(const HalfDepth& depth, const sensor::P
       const int by = straight_base(depth, x, y, 0, 1);
       if (bx == 0 || by == 0) continue;
 
+      // Normal from differences over a wide base
       SurfaceCandidate c;
       c.sample.point = point(x, y);
       const Eigen::Vector3f du = point(x + bx, y) - point(x - bx, y);
@@ -213,6 +214,7 @@ std::vector<maps::SurfaceSample> sample_surface(const cv::Mat& depth, const sens
   std::sort(order.begin(), order.end(),
             [&](std::uint32_t a, std::uint32_t b) { return scramble(a) < scramble(b); });
 
+  // Half by cells of the image, half by normals
   std::vector<char> taken(all.size(), 0);
   take_evenly(
       all, order, [](const SurfaceCandidate& c) { return c.cell; }, kCellsX * kCellsY, options.samples / 2,

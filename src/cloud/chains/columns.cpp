@@ -71,6 +71,7 @@ std::vector<std::size_t> find_all(const Cloud& before, const Cloud& after) {
   }
   if (found.size() == after.size()) return found;
 
+  // Otherwise by search among the sorted points
   std::vector<std::size_t> order = finite_indices(before);  // NaN has no order
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return before_in_order(before[a], before[b]); });

@@ -36,6 +36,7 @@ core::Result<void> PlyTiles::take_layout(const std::filesystem::path& file, cons
     return refused(
         "is a text file; tiles need binary PLY: write it as one with a chain without filters first");
 
+  // Only points, since tiles would cut a mesh
   if (header.elements.empty() || header.elements.front().name != "vertex")
     return refused("does not begin with points");
   for (std::size_t i = 1; i < header.elements.size(); ++i) {
@@ -47,6 +48,7 @@ core::Result<void> PlyTiles::take_layout(const std::filesystem::path& file, cons
     return a.name == b.name && a.type == b.type;
   };
 
+  // Properties must be those of the first file
   if (record_size_ > 0) {
     const bool fits = header.format == format_ && std::equal(properties.begin(), properties.end(),
                                                              properties_.begin(), properties_.end(), same);
@@ -100,6 +102,7 @@ core::Result<void> PlyTiles::add(const std::filesystem::path& file) {
     if (first && i % sampled == 0) sample(record);
     put(record);
 
+    // Each tile is a file
     if (tiles_.size() > kMostTiles) {
       return core::usage_error(
           fmt::format("{}: more than {} tiles of {:g} m; use larger ones, or remove far points first",

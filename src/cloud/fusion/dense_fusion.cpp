@@ -296,6 +296,8 @@ class Fusion {
       const auto found = pose_noise_.find(pack_cell(cell_of(at)));
 
       if (found != pose_noise_.end()) pose = &found->second;
+
+      // Variance along the normal, of depth and of poses
       float variance = fused.noise_m * fused.noise_m / static_cast<float>(std::max(1U, fused.observations));
       if (pose != nullptr) {
         const Eigen::Vector3f normal = fused.point.getNormalVector3fMap();

@@ -88,12 +88,14 @@ std::vector<ColorCell> color_cells(const Cloud& camera_cloud, const geometry::Ri
     if (last == nullptr || last->cell != key) last = &sums[key];
     last->cell = key;
 
+    // Dark and saturated colours do not show the exposure
     const auto [least, most] = std::minmax({p.r, p.g, p.b});
     if (least < kDark || most > kBright) continue;
     last->color += Eigen::Vector3f(p.r, p.g, p.b);
     last->points += 1.0F;
   }
 
+  // Means in the order of the cells
   std::vector<ColorCell> cells;
   cells.reserve(sums.size());
   for (const auto& [key, sum] : sums)

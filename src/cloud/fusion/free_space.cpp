@@ -182,6 +182,7 @@ DepthLimits::DepthLimits(const DepthRaster& raster)
       measured[i] = static_cast<std::uint16_t>((above != 0) + (here != 0) + (below != 0));
     }
 
+    // Limits over 3 x 3 cells, if enough have depth
     for (std::size_t i = 1; i + 1 < width; ++i) {
       if (measured[i - 1] + measured[i] + measured[i + 1] < kFewestCells) continue;
       nearest_[begin + i] = static_cast<std::uint16_t>(std::min({least[i - 1], least[i], least[i + 1]}) + 1);

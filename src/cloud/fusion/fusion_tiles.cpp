@@ -23,6 +23,7 @@ void cut(const Cells::iterator& begin, const Cells::iterator& end, const Eigen::
   const Eigen::Vector3i size = box.sizes();
   size.maxCoeff(&axis);
 
+  // Few enough cells: a tile, with the cells around
   if (count <= most_cells || size[axis] == 0) {
     const Eigen::AlignedBox3i around(box.min() - Eigen::Vector3i::Ones(),
                                      box.max() + Eigen::Vector3i::Ones());
@@ -76,6 +77,7 @@ std::vector<FusionTile> plan_tiles(const std::vector<std::vector<ColorCell>>& vi
   const Eigen::AlignedBox3i space(-most, most);
   cut(cells.begin(), cells.end(), space, std::max<std::size_t>(1, std::min(most_cells, share)), tiles);
 
+  // Views with points in the tile or its margin
   for (std::size_t v = 0; v < views.size(); ++v) {
     for (FusionTile& tile : tiles) {
       const Eigen::AlignedBox3i with_margin(tile.cells.min() - Eigen::Vector3i::Ones(),

@@ -195,6 +195,7 @@ Slope slope_along(const float* centre, std::ptrdiff_t step, int before, int afte
   Slope slope;
   if (before + after < std::max(2, base / 2)) return slope;
 
+  // Central difference over both sides
   slope.known = true;
   const float first = centre[-before * step];
   const float last = centre[after * step];
@@ -202,6 +203,7 @@ Slope slope_along(const float* centre, std::ptrdiff_t step, int before, int afte
   const int side = std::max(2, base / 3);
   if (before < side || after < side) return slope;
 
+  // At a crease both sides differ by more than noise
   const float slope_before = (*centre - first) / static_cast<float>(before);
   const float slope_after = (last - *centre) / static_cast<float>(after);
   slope.bend = slope_after - slope_before;

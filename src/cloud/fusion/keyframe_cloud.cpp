@@ -122,6 +122,7 @@ class PointMaker {
     const float most = 3.0F * smoothing_share(frame_.depth, static_cast<float>(options.min_depth_m),
                                               static_cast<float>(options.max_depth_m));
 
+    // No point moves farther than the noise
     for (int j = 0; j < means.height; ++j) {
       const float* depth = frame_.depth.ptr<float>(j * stride_);
       float* row = means.row(j);
@@ -147,6 +148,7 @@ class PointMaker {
         slope_along(w, grid_.width, reach_.up[cell], reach_.down[cell], base, noise_ * sigma);
     if (!along_y.known) return;
 
+    // The normal is the gradient of the inverse depth
     const float per_x = fx_ / static_cast<float>(stride_);
     const float per_y = fy_ / static_cast<float>(stride_);
     const float a = along_x.value * per_x;

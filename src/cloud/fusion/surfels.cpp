@@ -198,6 +198,7 @@ void Surfels::project(std::vector<FusedPoint>& points) const {
       });
     }
 
+    // Only along the normal, and within the noise
     if (!(total > 0.0F)) continue;
     const float most = kMostSigmas * noise_share_ * own.noise_m;
     p.getVector3fMap() += std::clamp(shift / total, -most, most) * own.normal;

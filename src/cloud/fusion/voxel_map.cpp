@@ -196,6 +196,7 @@ void VoxelMap::combine(const VoxelSide& sample, std::uint32_t view, VoxelSide& s
     if (squared > 0.0F) side.scatter += distance * distance / squared * side.weight * share;
   }
 
+  // Known normals replace directions to the camera
   if (side.weight == 0.0F || (sample.normal_known != 0 && side.normal_known == 0)) {
     side.normal = sample.normal;
     side.normal_known = sample.normal_known;
@@ -237,6 +238,7 @@ FusedPoint VoxelMap::point_of(std::uint64_t key, const VoxelSide& side, double v
   p.b = to_byte(static_cast<double>(side.color.z()));
   p.a = 255;
 
+  // Statistics of the samples
   fused.weight = side.weight;
   fused.spread_m = std::sqrt(side.scatter / side.weight);
   fused.noise_m = std::sqrt(side.variance / side.weight);

@@ -16,6 +16,7 @@ core::Result<CloudFile> read_ply_cloud(const std::filesystem::path& file, LargeC
   auto ply = read_ply(file, large == LargeCoordinates::kShifted);
   if (!ply) return tl::unexpected<core::Error>(ply.error());
 
+  // Meaning of each column, by its name
   std::vector<Meaning> meanings;
   std::vector<std::string> names;
   for (const auto& column : ply->columns) {

@@ -277,6 +277,7 @@ std::string read_compressed(ByteReader& reader, const PcdHeader& header, CloudBu
   const std::uint8_t* sizes = reader.take(8);
   if (sizes == nullptr) return "the file ends before its compressed data; it is truncated";
 
+  // Sizes of the compressed and the uncompressed data
   std::uint32_t packed_size = 0;
   std::uint32_t size = 0;
   std::memcpy(&packed_size, sizes, 4);
@@ -337,6 +338,7 @@ core::Result<CloudFile> read_pcd_cloud(const std::filesystem::path& file, LargeC
   ByteReader reader(file);
   if (!reader.open()) return error("cannot be read");
 
+  // The header must fit the file's size
   const auto header = read_header(reader);
   if (!header) return error(header.error().message);
   std::string problem = check_size(*header, reader.remaining());

@@ -274,12 +274,14 @@ std::string read_element(Body& body, const PlyElement& element, bool take_shift,
   const std::uint64_t room = body.reader().remaining() + (body.ascii() ? 1 : 0);
   if (element.count > 0 && least == 0) return fmt::format("element '{}' has no properties", element.name);
 
+  // A false promise must not allocate memory
   if (element.count > 0 && element.count > room / least) {
     return fmt::format(
         "header promises {} of '{}' (at least {} bytes each) but {} bytes are left; the file is truncated",
         element.count, element.name, least, body.reader().remaining());
   }
 
+  // Other elements are passed over
   std::uint64_t rows = 0;
   if (element.name == "vertex") {
     rows = read_vertices(body, element, take_shift, data);

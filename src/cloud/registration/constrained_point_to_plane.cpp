@@ -110,6 +110,7 @@ PlaneStep ConstrainedPointToPlane::step(const SurfaceCloud& source, const Surfac
     ++found.inliers;
   }
 
+  // Principal directions of the information
   found.rms = found.inliers > 0 ? std::sqrt(squares / found.inliers) : 0.0;
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(h);
   found.eigenvalues = eigen.eigenvalues();

@@ -58,6 +58,7 @@ double foreground_depth(const cv::Mat& depth, const Eigen::Vector2d& p, const Ei
   std::array<double, 2 * kMaxSide + 1> sorted{};
   const int side = std::min(options.side_px, kMaxSide);
 
+  // Depths across the line, in order and sorted
   std::size_t count = 0;
   for (int o = -side; o <= side; ++o) {
     const auto z = static_cast<double>(depth_at(depth, p.x() + o * normal.x(), p.y() + o * normal.y()));

@@ -135,6 +135,7 @@ std::vector<LineSegment> join_collinear(std::vector<LineSegment> segments,
   Glance glance(pieces);
   std::vector<char> gone(pieces.size(), 0);
 
+  // The first partner; blocks without one are skipped
   const auto partner_of = [&](std::size_t i) {
     for (std::size_t first = 0; first < pieces.size(); first += kAtATime) {
       const std::size_t last = std::min(pieces.size(), first + kAtATime);

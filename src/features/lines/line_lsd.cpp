@@ -110,6 +110,7 @@ Lsd::Lsd(const cv::Mat& image, float min_gradient, bool exact)
       gradients_[static_cast<std::size_t>(index)] = {static_cast<float>(gx) / norm,
                                                      static_cast<float>(gy) / norm, 0.5F * norm};
 
+      // Bins by magnitude, strongest first
       const int bin = kBins - 1 - std::min(kBins - 1, static_cast<int>(0.5F * kBinsPerLevel * norm));
       usable.push_back(index);
       bins.push_back(bin);
@@ -127,6 +128,7 @@ Lsd::Lsd(const cv::Mat& image, float min_gradient, bool exact)
   while (last < kBins && first[last + 1] <= enough) ++last;
   seeds_.resize(static_cast<std::size_t>(first[last]));
 
+  // Counting sort; only these pixels may join regions
   for (std::size_t i = 0; i < usable.size(); ++i) {
     const auto bin = static_cast<std::size_t>(bins[i]);
     if (bin >= last) continue;
@@ -142,6 +144,7 @@ void Lsd::grow(int seed, float cosine) {
     float x, y;
   };
 
+  // The eight neighbours of a pixel
   const std::array<Step, 8> around = {{{-width_ - 1, -1.0F, -1.0F},
                                        {-width_, 0.0F, -1.0F},
                                        {-width_ + 1, 1.0F, -1.0F},
@@ -212,6 +215,7 @@ Rectangle Lsd::fit() const {
   float high = 0.0F;
   float left = 0.0F;
   float right = 0.0F;
+
   for (const Pixel& i : region_) {
     const Eigen::Vector2f p = i.position() - centre;
     const float along = d.dot(p);

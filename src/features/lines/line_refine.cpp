@@ -97,6 +97,7 @@ void refine(LineSegment& segment, const cv::Mat& gray) {
       if (total > 0.5F) fit.add(2.0F * s - 1.0F, moment / sum, std::min(total, 20.0F));
     }
 
+    // Both ends move across the line
     float a = 0.0F;
     float b = 0.0F;
     if (!fit.solve(a, b) || std::abs(a) + std::abs(b) > static_cast<float>(kProfileReach)) return;

@@ -53,6 +53,7 @@ std::optional<Sight> sight_of(const maps::Map& map, const maps::Observation& see
     return Eigen::Vector2d(camera.project(here_from_there * (ray * (across.dot(there) / across.dot(ray)))));
   };
 
+  // Central differences of the mapping from patch to frame
   sight.frame_from_patch.col(0) = (0.5 * (carried(1.0, 0.0) - carried(-1.0, 0.0))).cast<float>();
   sight.frame_from_patch.col(1) = (0.5 * (carried(0.0, 1.0) - carried(0.0, -1.0))).cast<float>();
   sight.patch = &keyframe.features->patches[feature];

@@ -82,6 +82,7 @@ bool FrameAligner::correct_image_motion() {
   const double delay_s = in_.depth_delay_s;
   if (readout_s == 0.0 && delay_s == 0.0) return false;
 
+  // Velocities that follow from the new pose
   const Rigid3& pose = result_.camera_from_world;
   const auto at_stamp = in_.motion.velocity_after(frame().stamp, pose, 0.0);
   const auto until_depth = in_.motion.velocity_after(frame().stamp, pose, delay_s);
@@ -94,6 +95,7 @@ bool FrameAligner::correct_image_motion() {
       (delay_s * *until_depth - geometry::log_se3(motion_.depth_from_camera)) / (1.0 + ahead);
   const ImageMotion motion{readout_s * *at_stamp, geometry::exp_se3(change) * motion_.depth_from_camera};
 
+  // Shift of features at a typical distance
   constexpr double kDistance_m = 1.5;  // of what is seen
   const geometry::Vector6d shutter_change = 0.5 * (motion.shutter - motion_.shutter);
   const double moved_px =

@@ -133,6 +133,7 @@ ThumbnailAlignment align_thumbnails(const cv::Mat& previous, const cv::Mat& prev
     const Step step = linearise(pixels, current, small, pose, bias, kLoss);
     if (step.count < 200) break;
 
+    // The best pose so far is the result
     const double rms = std::sqrt(step.squares / step.count);
     if (i == 0) result.initial_rms = rms;
     if (best < 0.0 || rms < best) {
@@ -142,6 +143,7 @@ ThumbnailAlignment align_thumbnails(const cv::Mat& previous, const cv::Mat& prev
       result.pixels = step.count;
     }
 
+    // Step with the prior around the guess
     Matrix7d h = step.h;
     h.diagonal() += belief + Vector7d::Constant(1e-6);
     Vector7d g = step.g;
