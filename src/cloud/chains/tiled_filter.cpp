@@ -150,6 +150,7 @@ core::Result<TiledReport> filter_in_tiles(const FilterChain& chain, const std::v
     if (!tile) return tl::unexpected(tile.error());
     change_shift(*tile->cloud, tile->shift, context.shift);
 
+    // The chain on the tile and its margin, of which the tile is kept
     CloudColumns columns = std::move(tile->columns);
     CloudColumns made;
     context.columns = &columns;
@@ -159,6 +160,7 @@ core::Result<TiledReport> filter_in_tiles(const FilterChain& chain, const std::v
     if (!filtered) return tl::unexpected(filtered.error());
     keep_own(**filtered, made, context.shift, keys[i], tile_m);
 
+    // The disk holds a tile only once
     std::error_code ignored;
     fs::remove(file, ignored);
     if ((*filtered)->empty()) continue;

@@ -245,6 +245,7 @@ CloudPtr decoded(const Bytes& content) {
       cells <= kMostPoints && cells / 8 <= content.size() && head.step_m > 0.0 && std::isfinite(head.step_m),
       "its head is damaged");
 
+  // Cells of an organised cloud may have no point
   Point none;
   none.x = none.y = none.z = none.normal_x = none.normal_y = none.normal_z = kNan;
   auto cloud = std::make_shared<Cloud>();

@@ -163,6 +163,7 @@ class ClustersFilter : public Filter {
     const int fewest =
         std::min(min_points_, static_cast<int>(std::ceil(min_share_ * static_cast<double>(points->size()))));
 
+    // Over means of cells, if a leaf is given
     std::vector<pcl::Indices> clusters;
     if (leaf_m_ > 0.0) {
       constexpr double kMostCells = 1e9;  // from the origin: pcl::VoxelGrid numbers them with 31 bits
@@ -184,6 +185,7 @@ class ClustersFilter : public Filter {
       return a.size() != b.size() ? a.size() > b.size() : a.front() < b.front();
     });
 
+    // Each cluster is a segment
     if (count_ > 0) clusters.resize(std::min(clusters.size(), static_cast<std::size_t>(count_)));
     for (std::size_t c = 0; c < clusters.size(); ++c) {
       for (const auto i : clusters[c]) segments[static_cast<std::size_t>(i)] = static_cast<int>(c);
