@@ -237,7 +237,7 @@ class Fusion {
   void clean(std::vector<FusedPoint>& points, FusionReport& report) const {
     Surfels surfels(points, block_m(options_.voxels.voxel_m));
 
-    // Surfels that other views look through
+    // Surfels in the free space of other views
     std::vector<std::uint8_t> goes(surfels.all().size(), 0);
     if (options_.free_space) goes = seen_through(surfels, rasters_, is_depth_view_, world_from_cloud_);
 
