@@ -14,6 +14,7 @@ using geometry::Rigid3;
 using geometry::Vector6d;
 using Rows46 = Eigen::Matrix<double, 4, 6>;
 
+// Distances of a segment's ends from the projected line, with derivatives.
 void image_rows(const LineView& seen, const Eigen::Matrix3d& projection, const Eigen::Vector3d& l,
                 double norm_sq, Eigen::Vector4d& residual, Rows46& by_line) {
   const double w = seen.pixel_weight / std::sqrt(norm_sq);
@@ -100,6 +101,7 @@ Eigen::Vector4d line_rows(const LineView& seen, const Eigen::Matrix3d& projectio
   derivatives->by_pose.leftCols<3>().noalias() = -(by_n * v);
   derivatives->by_pose.rightCols<3>().noalias() = -(by_n * geometry::skew(line.n)) - by_v * v;
 
+  // Derivatives by the line in the world
   Rows46 by_world;  // n_c = R n_w + [t]x R v_w, v_c = R v_w
   by_world.leftCols<3>().noalias() = by_n * camera_from_world.rotation;
   by_world.rightCols<3>().noalias() =
@@ -122,6 +124,7 @@ Vector6d edge_rows(const EdgeView& edge, const Rigid3& a_from_world, const Rigid
   const Rigid3 b_from_a = b_from_world * a_from_world.inverse();
   const Vector6d e = geometry::log_se3(b_from_a * edge.a_from_b);
   if (derivatives != nullptr) {
+    // Inverse left Jacobian of SE(3), to first order
     Matrix6d inverse_left = Matrix6d::Identity();
     const Eigen::Matrix3d rho = geometry::skew(e.head<3>());
     const Eigen::Matrix3d phi = geometry::skew(e.tail<3>());

@@ -54,6 +54,7 @@ std::vector<optimize::PlaneTerm> associate_surface(const std::vector<WorldSurfac
     const double cosine = -normal.dot(p) / p.norm();
     if (cosine < 0.25) continue;
 
+    // The measured point, near the sample's tangent plane
     const double z = depth_at(depth, pixel.x(), pixel.y());
     if (!(z > 0.25) || z > options.max_depth_m) continue;
     if (in_view != nullptr) ++*in_view;
@@ -61,6 +62,7 @@ std::vector<optimize::PlaneTerm> associate_surface(const std::vector<WorldSurfac
     const double distance = s.normal.dot(world_from_depth * measured - s.point);
     if (std::abs(distance) > options.max_distance_m) continue;
 
+    // Noise of the measurement and of the map
     const double measured_sigma = sensor::depth_sigma(z) * std::max(0.3, -normal.z());
     terms.push_back({camera_from_depth * measured, s.point, s.normal,
                      std::sqrt(measured_sigma * measured_sigma + s.sigma * s.sigma)});

@@ -33,6 +33,7 @@ struct LineCandidate {
   float length = 0.0F;
 };
 
+// Direction, middle and length of each line, computed once.
 std::vector<LineCandidate> candidates_of(const features::FrameFeatures& frame) {
   std::vector<LineCandidate> candidates;
   candidates.reserve(frame.lines.size());
@@ -50,8 +51,8 @@ std::vector<LineMatch> match_lines(const maps::Map& map, const std::vector<core:
                                    const AssociationOptions& options, std::vector<core::LineId>* visible) {
   const auto min_cosine = static_cast<float>(std::cos(options.max_line_angle_rad));
   const std::vector<LineCandidate> candidates = candidates_of(frame);
-
   std::vector<LineMatch> by_feature(frame.lines.size());
+
   for (core::LineId id : lines) {
     const maps::MapLine* line = map.find(id);
     features::LineSegment predicted;
@@ -62,6 +63,7 @@ std::vector<LineMatch> match_lines(const maps::Map& map, const std::vector<core:
     const Eigen::Vector2f d = predicted.direction();
     const float length = predicted.length();
 
+    // Similar in place, direction, length and descriptor
     for (std::size_t i = 0; i < candidates.size(); ++i) {
       if (d.dot(candidates[i].direction) < min_cosine) continue;
       const Eigen::Vector2f r = candidates[i].middle - predicted.start;
@@ -74,6 +76,7 @@ std::vector<LineMatch> match_lines(const maps::Map& map, const std::vector<core:
       if (distance < best.distance) best = {id, static_cast<int>(i), distance};
     }
 
+    // Each feature keeps its best landmark
     if (best.feature < 0) continue;
     LineMatch& slot = by_feature[static_cast<std::size_t>(best.feature)];
     if (slot.feature < 0 || best.distance < slot.distance) slot = best;

@@ -55,6 +55,7 @@ class Roll {
     if (!keyframe.valid() || !map_.has_keyframe(keyframe)) return 0.0F;
     const auto [found, inserted] = degrees_.try_emplace(keyframe, 0.0F);
     if (inserted) {
+      // Once for each keyframe: rotation about the optical axis
       const Eigen::Matrix3d r = camera_.rotation * map_.camera_from_world(keyframe).rotation.transpose();
       found->second = static_cast<float>(std::atan2(r(1, 0), r(0, 0)) * 180.0 / 3.14159265358979);
     }
@@ -79,6 +80,8 @@ struct BestTwo {
   int distance = 257;
   int second = 257;
 };
+
+// Best and second best corner; several at one place count once.
 BestTwo best_two(const std::vector<features::PointFeature>& corners, const std::vector<int>& near,
                  const std::vector<int>& distances) {
   constexpr float kSamePlace_px = 3.0F;
@@ -139,10 +142,13 @@ std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<cor
     }
 
     if (visible != nullptr) visible->push_back(id);
+
+    // Corners near the prediction, farther on coarse levels
     near.clear();
     const double grown = radius * std::pow(options.scale_factor, std::clamp(prediction.octave, 0, 4));
     frame.grid.within(frame.points, prediction.u, prediction.v, static_cast<float>(grown), near);
 
+    // Only corners of similar size and orientation
     const float angle = point->angle + roll.since(point->angle_keyframe);
     const auto unlike = [&](int i) {
       const features::PointFeature& f = frame.points[static_cast<std::size_t>(i)];
@@ -157,6 +163,7 @@ std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<cor
       distances.push_back(features::hamming_distance(point->descriptor, other));
     }
 
+    // Unambiguous matches; each corner keeps its best landmark
     const BestTwo best = best_two(frame.points, near, distances);
     if (best.distance > options.max_hamming || best.distance > options.ratio * best.second) continue;
     PointMatch& slot = by_feature[static_cast<std::size_t>(best.feature)];

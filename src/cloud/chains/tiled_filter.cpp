@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder beside the output that is gone when this is.
+/// A folder next to the output, removed together with this object.
 class TileFolder {
  public:
   explicit TileFolder(const fs::path& output)
@@ -78,6 +78,7 @@ core::Result<void> join(const std::vector<fs::path>& pieces, std::size_t points,
     const std::size_t count = header.find("element vertex ");
     const std::size_t behind = header.find('\n', count);
 
+    // The first piece's header, with the points of all
     if (properties.empty()) {
       properties = header.substr(behind);
       out.write(header.substr(0, count) + fmt::format("element vertex {}", points) + properties);
@@ -85,6 +86,7 @@ core::Result<void> join(const std::vector<fs::path>& pieces, std::size_t points,
       return core::usage_error("the chain gives tiles different properties; run it without --tiles");
     }
 
+    // The points follow unchanged, block by block
     constexpr std::uint64_t kBlock = 1 << 18;
     while (reader.remaining() > 0) {
       const auto size = static_cast<std::size_t>(std::min(kBlock, reader.remaining()));
@@ -148,6 +150,7 @@ core::Result<TiledReport> filter_in_tiles(const FilterChain& chain, const std::v
     if (!tile) return tl::unexpected(tile.error());
     change_shift(*tile->cloud, tile->shift, context.shift);
 
+    // The chain on the tile and its margin, of which the tile is kept
     CloudColumns columns = std::move(tile->columns);
     CloudColumns made;
     context.columns = &columns;
@@ -157,6 +160,7 @@ core::Result<TiledReport> filter_in_tiles(const FilterChain& chain, const std::v
     if (!filtered) return tl::unexpected(filtered.error());
     keep_own(**filtered, made, context.shift, keys[i], tile_m);
 
+    // The disk holds a tile only once
     std::error_code ignored;
     fs::remove(file, ignored);
     if ((*filtered)->empty()) continue;

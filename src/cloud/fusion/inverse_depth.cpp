@@ -111,11 +111,13 @@ Grid smooth_inverse_depth(const cv::Mat& depth, int stride, int window, float mi
   smoothed.values.resize(static_cast<std::size_t>(smoothed.width) *
                          static_cast<std::size_t>(smoothed.height));
 
+  // Along columns, for the remaining rows only
   Pass pass(rows.width);
   for (int j = 0; j < smoothed.height; ++j) {
     const int v = j * stride;
     const float* reference = rows.row(v);
     pass.start(reference);
+
     for (int d = 1; d <= std::min({half, v, rows.height - 1 - v}); ++d) {
       pass.add(rows.row(v - d), rows.row(v + d), reference, static_cast<float>(d) * kSmoothTangent / focal);
     }
@@ -139,6 +141,7 @@ void widen_means(Grid& grid, int step, float noise, float wanted_m) {
         const float sigma = noise * inverse_depth_sigma(middle);
         const float pair = from[i - stride] + from[i + stride];
 
+        // Only where noisy, and straight within the noise
         const bool noisy = sigma > wanted_m * middle * middle;
         const bool straight = std::abs(pair - 2.0F * middle) < kStraight * sigma;
         to[i] = noisy && straight ? (pair + middle) * (1.0F / 3.0F) : middle;
@@ -146,6 +149,7 @@ void widen_means(Grid& grid, int step, float noise, float wanted_m) {
     }
   };
 
+  // First along rows, then along columns
   along(step, true);
   along(static_cast<std::ptrdiff_t>(step) * grid.width, false);
 }
@@ -155,15 +159,17 @@ Reach surface_reach(const Grid& grid, int stride, float focal, int longest) {
   Reach reach{std::vector<std::uint8_t>(count), std::vector<std::uint8_t>(count),
               std::vector<std::uint8_t>(count), std::vector<std::uint8_t>(count)};
   const float tangent = static_cast<float>(stride) * kLinkTangent / focal;
+
+  // Neighbours are linked if noise or slope explains their difference
   const auto linked = [tangent](float a, float b) {
     const float nearer = std::max(a, b);
     return std::min(a, b) > 0.0F && std::abs(a - b) < 2.0F * inverse_depth_sigma(nearer) + tangent * nearer;
   };
-
   const auto next = [longest](std::uint8_t n) { return static_cast<std::uint8_t>(std::min(longest, n + 1)); };
   const auto width = static_cast<std::size_t>(grid.width);
   const float* w = grid.values.data();
 
+  // The reach grows by one with each link
   for (std::size_t row = 0; row < count; row += width) {
     for (std::size_t i = row + 1; i < row + width; ++i) {
       reach.left[i] = linked(w[i], w[i - 1]) ? next(reach.left[i - 1]) : std::uint8_t{0};
@@ -176,7 +182,6 @@ Reach surface_reach(const Grid& grid, int stride, float focal, int longest) {
   for (std::size_t i = width; i < count; ++i) {
     reach.up[i] = linked(w[i], w[i - width]) ? next(reach.up[i - width]) : std::uint8_t{0};
   }
-
   for (std::size_t i = count; i-- > width;) {
     reach.down[i - width] = linked(w[i], w[i - width]) ? next(reach.down[i]) : std::uint8_t{0};
   }
@@ -190,6 +195,7 @@ Slope slope_along(const float* centre, std::ptrdiff_t step, int before, int afte
   Slope slope;
   if (before + after < std::max(2, base / 2)) return slope;
 
+  // Central difference over both sides
   slope.known = true;
   const float first = centre[-before * step];
   const float last = centre[after * step];
@@ -197,6 +203,7 @@ Slope slope_along(const float* centre, std::ptrdiff_t step, int before, int afte
   const int side = std::max(2, base / 3);
   if (before < side || after < side) return slope;
 
+  // At a crease both sides differ by more than noise
   const float slope_before = (*centre - first) / static_cast<float>(before);
   const float slope_after = (last - *centre) / static_cast<float>(after);
   slope.bend = slope_after - slope_before;

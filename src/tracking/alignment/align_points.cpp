@@ -53,6 +53,7 @@ std::optional<Sight> sight_of(const maps::Map& map, const maps::Observation& see
     return Eigen::Vector2d(camera.project(here_from_there * (ray * (across.dot(there) / across.dot(ray)))));
   };
 
+  // Central differences of the mapping from patch to frame
   sight.frame_from_patch.col(0) = (0.5 * (carried(1.0, 0.0) - carried(-1.0, 0.0))).cast<float>();
   sight.frame_from_patch.col(1) = (0.5 * (carried(0.0, 1.0) - carried(0.0, -1.0))).cast<float>();
   sight.patch = &keyframe.features->patches[feature];
@@ -61,7 +62,7 @@ std::optional<Sight> sight_of(const maps::Map& map, const maps::Observation& see
 }
 
 /// The first keyframe that saw the landmark from a direction and at a distance not too different: newer ones
-/// were aligned with older ones, and add up what each is off.
+/// were aligned with older ones and accumulate their errors.
 std::optional<Sight> first_sight(const maps::Map& map, const maps::MapPoint& point,
                                  const sensor::Pinhole& camera, const geometry::Rigid3& camera_from_world,
                                  double log_scale) {
@@ -102,6 +103,8 @@ void align_points(const maps::Map& map, const features::FrameFeatures& frame, co
   }
   if (frame.levels.empty() || frame.patches.size() != frame.points.size()) return;
   const double log_scale = std::log(scale_factor);
+
+  // Shift of the corner against an earlier observation
   for (PointMatch& m : matches) {
     const auto sight = first_sight(map, map.point(m.point), camera, camera_from_world, log_scale);
     if (!sight) continue;
