@@ -149,7 +149,7 @@ core::Result<void> filter_tiles(const FilterRequest& request, const cloud::Filte
   cloud::CloudFrame frame = maps::frame_of_cloud(inputs.front(), cloud::frame_of_ply(inputs.front()));
   Console& console = session.console();
   const auto report = cloud::filter_in_tiles(
-      chain, inputs, output, request.tiles.tiles_m, frame, &session.executor(),
+      chain, {inputs, output}, request.tiles.tiles_m, frame, &session.executor(),
       [&console](std::size_t done, std::size_t total) { console.progress(done, total, "tiles"); });
   console.end_progress();
   if (!report) return tl::unexpected<core::Error>(report.error());

@@ -298,6 +298,60 @@ std::string read_element(Body& body, const PlyElement& element, bool take_shift,
   return place + (body.problem().empty() ? "the file ends here; it is truncated" : body.problem());
 }
 
+/// Columns of different lengths are an error of the caller.
+void check_lengths(const PlyData& data) {
+  for (const auto& column : data.columns) {
+    const std::size_t length = std::visit([](const auto& v) { return v.size(); }, column.values);
+    if (length != data.vertex_count)
+      throw std::invalid_argument("PLY column '" + column.name + "' has another length");
+  }
+  if (!data.edge_colors.empty() && data.edge_colors.size() != data.edges.size())
+    throw std::invalid_argument("PLY edge colours");
+}
+
+/// Offset of a column's numbers; only positions are shifted, and written as doubles.
+double shift_of(const PlyData& data, const PlyColumn& column) {
+  const bool position = column.name == "x" || column.name == "y" || column.name == "z";
+  return position ? data.shift[static_cast<std::size_t>(column.name[0] - 'x')] : 0.0;
+}
+
+/// Elements in the order in which their records follow.
+std::string header_of(const PlyData& data) {
+  std::string text = "ply\nformat binary_little_endian 1.0\n";
+  for (const auto& comment : data.comments) text += "comment " + comment + "\n";
+  text += fmt::format("element vertex {}\n", data.vertex_count);
+
+  for (const auto& column : data.columns) {
+    const bool floats = std::holds_alternative<std::vector<float>>(column.values);
+    const char* type = !floats ? "uchar" : shift_of(data, column) != 0.0 ? "double" : "float";
+    text += fmt::format("property {} {}\n", type, column.name);
+  }
+
+  // Empty elements are left out
+  if (!data.triangles.empty())
+    text += fmt::format("element face {}\nproperty list uchar int vertex_indices\n", data.triangles.size());
+  if (!data.edges.empty()) {
+    text += fmt::format("element edge {}\nproperty int vertex1\nproperty int vertex2\n", data.edges.size());
+    if (!data.edge_colors.empty()) text += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  }
+  return text + "end_header\n";
+}
+
+/// Vertices with their absolute positions.
+void put_vertices(const PlyData& data, core::OutputFile& out) {
+  for (std::size_t row = 0; row < data.vertex_count; ++row) {
+    for (const auto& column : data.columns) {
+      const auto* floats = std::get_if<std::vector<float>>(&column.values);
+      const double shift = floats != nullptr ? shift_of(data, column) : 0.0;
+      if (shift != 0.0) {
+        out.put(with_shift((*floats)[row], shift));
+      } else {
+        std::visit([&out, row](const auto& values) { out.put(values[row]); }, column.values);
+      }
+    }
+  }
+}
+
 }  // namespace
 
 const std::vector<float>* PlyData::floats(std::string_view name) const {
@@ -343,60 +397,12 @@ core::Result<PlyData> read_ply(const std::filesystem::path& file, bool take_shif
 }
 
 core::Result<void> write_ply(const std::filesystem::path& file, const PlyData& data) {
-  // Columns of different lengths are an error of the caller
-  for (const auto& column : data.columns) {
-    const std::size_t length = std::visit([](const auto& v) { return v.size(); }, column.values);
-    if (length != data.vertex_count)
-      throw std::invalid_argument("PLY column '" + column.name + "' has another length");
-  }
-
-  const bool colored = !data.edge_colors.empty();
-  if (colored && data.edge_colors.size() != data.edges.size())
-    throw std::invalid_argument("PLY edge colours");
-
+  check_lengths(data);
   core::OutputFile out(file);
-  out.write("ply\nformat binary_little_endian 1.0\n");
-  for (const auto& comment : data.comments) out.write("comment " + comment + "\n");
-  out.write(fmt::format("element vertex {}\n", data.vertex_count));
+  out.write(header_of(data));
+  put_vertices(data, out);
 
-  // Only positions are shifted, and written as doubles
-  const auto shift_of = [&data](const PlyColumn& column) {
-    const bool position = column.name == "x" || column.name == "y" || column.name == "z";
-    return position ? data.shift[static_cast<std::size_t>(column.name[0] - 'x')] : 0.0;
-  };
-
-  for (const auto& column : data.columns) {
-    const bool floats = std::holds_alternative<std::vector<float>>(column.values);
-    const char* type = !floats ? "uchar" : shift_of(column) != 0.0 ? "double" : "float";
-    out.write(fmt::format("property {} {}\n", type, column.name));
-  }
-
-  if (!data.triangles.empty()) {
-    out.write(
-        fmt::format("element face {}\nproperty list uchar int vertex_indices\n", data.triangles.size()));
-  }
-
-  if (!data.edges.empty()) {
-    out.write(
-        fmt::format("element edge {}\nproperty int vertex1\nproperty int vertex2\n", data.edges.size()));
-    if (colored) out.write("property uchar red\nproperty uchar green\nproperty uchar blue\n");
-  }
-
-  out.write("end_header\n");
-
-  // Vertices with their absolute positions
-  for (std::size_t row = 0; row < data.vertex_count; ++row) {
-    for (const auto& column : data.columns) {
-      const auto* floats = std::get_if<std::vector<float>>(&column.values);
-      const double shift = floats != nullptr ? shift_of(column) : 0.0;
-      if (shift != 0.0) {
-        out.put(with_shift((*floats)[row], shift));
-      } else {
-        std::visit([&out, row](const auto& values) { out.put(values[row]); }, column.values);
-      }
-    }
-  }
-
+  // Triangles are lists of three
   for (const auto& triangle : data.triangles) {
     out.put(std::uint8_t{3});
     out.put(triangle);
@@ -404,7 +410,7 @@ core::Result<void> write_ply(const std::filesystem::path& file, const PlyData& d
 
   for (std::size_t i = 0; i < data.edges.size(); ++i) {
     out.put(data.edges[i]);
-    if (colored) out.put(data.edge_colors[i]);
+    if (!data.edge_colors.empty()) out.put(data.edge_colors[i]);
   }
 
   return out.commit();
