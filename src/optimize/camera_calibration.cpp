@@ -234,9 +234,9 @@ bool adjust(const CalibrationProblem& problem, CameraUnknowns& unknowns, ceres::
   return summary.IsSolutionUsable();
 }
 
-/// The quadratic cost around the present unknowns, with poses and points eliminated.
-std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, CameraUnknowns& unknowns,
-                                         ceres::Problem& ceres_problem) {
+/// The camera's columns of the Jacobian, then those of poses and points that the cost depends on.
+ceres::Problem::EvaluateOptions columns_of(const CalibrationProblem& problem, CameraUnknowns& unknowns,
+                                           const ceres::Problem& ceres_problem) {
   ceres::Problem::EvaluateOptions order;
   order.parameter_blocks.push_back(unknowns.change());
   for (std::size_t i = 0; i < problem.poses.size(); ++i) {
@@ -249,42 +249,38 @@ std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, Came
     double* point = unknowns.point(static_cast<int>(i));
     if (ceres_problem.HasParameterBlock(point)) order.parameter_blocks.push_back(point);
   }
+  return order;
+}
 
-  CameraEvidence evidence;
-  evidence.at = Eigen::Map<const CameraChange>(unknowns.change());
-  std::vector<double> residuals;
-  ceres::CRSMatrix crs;
-
-  if (!ceres_problem.Evaluate(order, &evidence.cost, &residuals, nullptr, &crs)) return std::nullopt;
-
-  // Jacobian by the camera, then by all other unknowns
+/// The part of each row's derivative by the camera that remains when poses and points follow it.
+std::optional<Eigen::MatrixXd> derivative_by_camera_alone(const ceres::CRSMatrix& crs) {
   const Eigen::SparseMatrix<double> jacobian = Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(
       crs.num_rows, crs.num_cols, static_cast<int>(crs.values.size()), crs.rows.data(), crs.cols.data(),
       crs.values.data());
   constexpr int kCamera = kCameraUnknowns;
-  const int others = crs.num_cols - kCamera;
-
-  const Eigen::SparseMatrix<double> by_others = jacobian.rightCols(others);
-
+  const Eigen::SparseMatrix<double> by_others = jacobian.rightCols(crs.num_cols - kCamera);
   const Eigen::MatrixXd by_camera = jacobian.leftCols(kCamera);
+
+  // Normal equations of poses and points
   Eigen::SparseMatrix<double> normal = by_others.transpose() * by_others;
   normal.diagonal() *= 1.0 + 1e-9;  // a point may be seen along one ray only
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);
-
   if (factor.info() != Eigen::Success) return std::nullopt;
 
-  // The part of each row's derivative by the camera that remains when poses and points follow it.
   const Eigen::MatrixXd answered = factor.solve(Eigen::MatrixXd(by_others.transpose() * by_camera));
-  const Eigen::MatrixXd alone = by_camera - by_others * answered;
-
+  Eigen::MatrixXd alone = by_camera - by_others * answered;
   if (!alone.allFinite()) return std::nullopt;
+  return alone;
+}
 
-  // Gradient and information of each block of time
+/// Gradient and information of each block of time, and of all.
+void add_blocks(const CalibrationProblem& problem, const Eigen::MatrixXd& derivatives,
+                const std::vector<double>& residuals, CameraEvidence& evidence) {
   std::map<int, EvidenceBlock> blocks;
   Eigen::Index row = 0;
   for (const CalibrationObservation& o : problem.observations) {
     const Eigen::Index rows = o.depth > 0.0 ? 3 : 2;
-    const auto derivative = alone.middleRows(row, rows);
+    const auto derivative = derivatives.middleRows(row, rows);
     const Eigen::Map<const Eigen::VectorXd> residual(residuals.data() + row, rows);
     EvidenceBlock& block = blocks[problem.poses[static_cast<std::size_t>(o.pose)].block];
 
@@ -298,7 +294,22 @@ std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, Came
     evidence.all.information += block.information;
     evidence.blocks.push_back(block);
   }
+}
 
+/// The quadratic cost around the present unknowns, with poses and points eliminated.
+std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, CameraUnknowns& unknowns,
+                                         ceres::Problem& ceres_problem) {
+  CameraEvidence evidence;
+  evidence.at = Eigen::Map<const CameraChange>(unknowns.change());
+  std::vector<double> residuals;
+  ceres::CRSMatrix crs;
+  if (!ceres_problem.Evaluate(columns_of(problem, unknowns, ceres_problem), &evidence.cost, &residuals,
+                              nullptr, &crs))
+    return std::nullopt;
+
+  const auto alone = derivative_by_camera_alone(crs);
+  if (!alone) return std::nullopt;
+  add_blocks(problem, *alone, residuals, evidence);
   return evidence;
 }
 

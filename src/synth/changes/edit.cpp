@@ -41,10 +41,13 @@ bool hangs(const std::string& type) {
 
 /// The space that a wall takes.
 struct Editor::Slab {
-  Vector2d origin, along, normal;
-  double from, to, half;     // m along it, and half its thickness
-  double low, high;          // m: heights of its storey
-  std::vector<int> objects;  // its own
+  Vector2d origin{0, 0}, along{1, 0}, normal{0, 1};
+  double from = 1e9, to = -1e9, half = 0.0;  // m along it, and half its thickness
+  double low = -1e9, high = 1e9;             // m: heights of its storey
+  std::vector<int> objects;                  // its own
+
+  /// Makes it long enough for a place on it.
+  void extend(const Vector2d& p);
   [[nodiscard]] bool has(const Face& face) const {
     double z = 1e9;
     for (const Vector2d& uv : face.polygon) z = std::min(z, face.at(uv.x(), uv.y()).z());
@@ -214,73 +217,77 @@ core::Result<void> Editor::add(const Edit& edit) {
   return {};
 }
 
-std::optional<Editor::Slab> Editor::slab(const std::string& wall) const {
-  Slab slab{{0, 0}, {1, 0}, {0, 1}, 1e9, -1e9, 0.0, -1e9, 1e9, {}};
-  const auto extend = [&](const Vector2d& p) {
-    slab.from = std::min(slab.from, slab.along.dot(p - slab.origin));
-    slab.to = std::max(slab.to, slab.along.dot(p - slab.origin));
-  };
+void Editor::Slab::extend(const Vector2d& p) {
+  from = std::min(from, along.dot(p - origin));
+  to = std::max(to, along.dot(p - origin));
+}
 
+/// A numbered wall of the plan, as plan.json has it.
+std::optional<Editor::Slab> Editor::slab_of_plan(const Plan& plan, const std::string& wall) const {
+  Slab slab;
   const auto number = core::to_number(wall);
+  if (!number || *number < 0.0 || *number >= static_cast<double>(plan.walls.size())) return std::nullopt;
+  const int index = static_cast<int>(*number);
+  const PlanWall& w = plan.walls[static_cast<std::size_t>(index)];
+  slab.origin = w.origin;
+  slab.along = w.direction;
+  slab.half = 0.5 * w.thickness;
 
-  // Numbered walls, as plan.json has them.
-  if (scene_.plan) {
-    const Plan& plan = *scene_.plan;
-    if (!number || *number < 0.0 || *number >= static_cast<double>(plan.walls.size())) return std::nullopt;
-    const int index = static_cast<int>(*number);
-    const PlanWall& w = plan.walls[static_cast<std::size_t>(index)];
-    slab.origin = w.origin;
-    slab.along = w.direction;
+  // Objects of walls and openings are in the order of the plan.
+  std::vector<int> walls, openings;
+  for (std::size_t k = 0; k < scene_.objects.size(); ++k) {
+    if (scene_.objects[k].type == "wall") walls.push_back(static_cast<int>(k));
+    if (scene_.objects[k].type == "opening") openings.push_back(static_cast<int>(k));
+  }
 
-    slab.half = 0.5 * w.thickness;
-
-    // Objects of walls and openings are in the order of the plan.
-    std::vector<int> walls, openings;
-    for (std::size_t k = 0; k < scene_.objects.size(); ++k) {
-      if (scene_.objects[k].type == "wall") walls.push_back(static_cast<int>(k));
-      if (scene_.objects[k].type == "opening") openings.push_back(static_cast<int>(k));
-    }
-    std::size_t next = 0;
-
-    // Faces of the wall, and its storey.
-    for (const PlanRoom& room : plan.rooms) {
-      for (const PlanFace& face : room.faces) {
-        const int object = walls[next++];
-        if (face.wall != index) continue;
-        const auto storey = static_cast<std::size_t>(room.storey);
-        slab.low = plan.storeys[storey] - 0.05;
-        slab.high = storey + 1 < plan.storeys.size() ? plan.storeys[storey + 1] - 0.05 : 1e9;
-        slab.objects.push_back(object);
-        extend(face.from);
-        extend(face.to);
-      }
-    }
-
-    // Openings belong to the wall.
-    for (std::size_t i = 0; i < plan.openings.size(); ++i) {
-      if (plan.openings[i].wall == index) slab.objects.push_back(openings[i]);
-    }
-  } else {
-    // Named walls of scene files.
-    const int object = find(wall);
-    if (object < 0 || scene_.objects[static_cast<std::size_t>(object)].type != "wall") return std::nullopt;
-    const auto face = std::find_if(scene_.faces.begin(), scene_.faces.end(),
-                                   [&](const Face& f) { return f.object == object; });
-    const Face &front = face[0], &back = face[1];  // of the first piece
-    slab.along = front.u_axis.head<2>();
-    slab.half = 0.5 * std::abs(front.normal.dot(front.origin - back.origin));
-    slab.origin = (front.origin - slab.half * front.normal).head<2>();
-
-    // Extent from all pieces of the wall.
-    slab.objects = {object};
-    for (const Face& f : scene_.faces) {
-      if (f.object != object || std::abs(f.normal.dot(front.normal)) < 0.9) continue;
-      for (const Vector2d& uv : f.polygon) extend(f.at(uv.x(), uv.y()).head<2>());
+  // Faces of the wall, and its storey.
+  std::size_t next = 0;
+  for (const PlanRoom& room : plan.rooms) {
+    for (const PlanFace& face : room.faces) {
+      const int object = walls[next++];
+      if (face.wall != index) continue;
+      const auto storey = static_cast<std::size_t>(room.storey);
+      slab.low = plan.storeys[storey] - 0.05;
+      slab.high = storey + 1 < plan.storeys.size() ? plan.storeys[storey + 1] - 0.05 : 1e9;
+      slab.objects.push_back(object);
+      slab.extend(face.from);
+      slab.extend(face.to);
     }
   }
 
-  slab.normal = {-slab.along.y(), slab.along.x()};
-  return slab.from < slab.to ? std::optional<Slab>(slab) : std::nullopt;
+  // Openings belong to the wall.
+  for (std::size_t i = 0; i < plan.openings.size(); ++i) {
+    if (plan.openings[i].wall == index) slab.objects.push_back(openings[i]);
+  }
+  return slab;
+}
+
+/// A named wall of a scene file.
+std::optional<Editor::Slab> Editor::slab_of_object(const std::string& wall) const {
+  const int object = find(wall);
+  if (object < 0 || scene_.objects[static_cast<std::size_t>(object)].type != "wall") return std::nullopt;
+  const auto face = std::find_if(scene_.faces.begin(), scene_.faces.end(),
+                                 [&](const Face& f) { return f.object == object; });
+  const Face &front = face[0], &back = face[1];  // of the first piece
+  Slab slab;
+  slab.along = front.u_axis.head<2>();
+  slab.half = 0.5 * std::abs(front.normal.dot(front.origin - back.origin));
+  slab.origin = (front.origin - slab.half * front.normal).head<2>();
+
+  // Extent from all pieces of the wall.
+  slab.objects = {object};
+  for (const Face& f : scene_.faces) {
+    if (f.object != object || std::abs(f.normal.dot(front.normal)) < 0.9) continue;
+    for (const Vector2d& uv : f.polygon) slab.extend(f.at(uv.x(), uv.y()).head<2>());
+  }
+  return slab;
+}
+
+std::optional<Editor::Slab> Editor::slab(const std::string& wall) const {
+  std::optional<Slab> slab = scene_.plan ? slab_of_plan(*scene_.plan, wall) : slab_of_object(wall);
+  if (!slab || slab->from >= slab->to) return std::nullopt;
+  slab->normal = {-slab->along.y(), slab->along.x()};
+  return slab;
 }
 
 bool Editor::square(const std::string& wall) const {

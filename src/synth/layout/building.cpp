@@ -218,6 +218,127 @@ const PlanRoom* stairs_of(const Plan& plan) {
   return room == plan.rooms.end() ? nullptr : &*room;
 }
 
+/// Independent random numbers for the steps of one storey.
+struct StoreyRandom {
+  explicit StoreyRandom(std::uint64_t own)
+      : cells(own, 1), rooms(own, 2), openings(own, 3), shell(own, 4), things(own, 5) {}
+  Rng cells, rooms, openings, shell, things;
+};
+
+/// Rooms and openings of a storey; false if this attempt failed.
+bool plan_storey(const SynthOptions& options, const BuildingFrame& frame, int storey, StoreyRandom& random,
+                 Plan& part) {
+  const int alike = std::max(options.like, options.copies);
+  if (!add_rooms(draw_storey(frame, options.rooms, alike, options.hall && storey == 0, random.cells),
+                 random.rooms, part))
+    return false;
+
+  // Rooms end at the ceiling; stairs go through it.
+  const bool highest = storey + 1 == options.floors;
+  for (PlanRoom& room : part.rooms) {
+    room.height = std::min(room.height, frame.height);
+    if (room.kind == "stairs") room.height = highest ? frame.height : frame.pitch;
+  }
+
+  // Openings, with every room reachable.
+  if (!add_openings(random.openings, part)) return false;
+  clear_stairs(part);
+  return stairs_of(part) != nullptr && make_alike(part) && connected(part);
+}
+
+/// Walls, the way up and furniture of a storey, with its floor at height 0.
+void build_storey(const SynthOptions& options, const BuildingFrame& frame, int storey, StoreyRandom& random,
+                  Plan& part, Builder& builder) {
+  build_shell(part, random.shell, builder);
+  const PlanRoom* stairs = stairs_of(part);
+  const Stairwell well(*stairs, frame.pitch);
+  const int index = static_cast<int>(stairs - part.rooms.data());
+
+  // One way up: lift or stairs.
+  const bool lowest = storey == 0, highest = storey + 1 == options.floors;
+  if (options.lift) {
+    build_lift_storey(well.shaft(), index, lowest, highest, highest ? frame.height : frame.pitch, builder);
+  } else {
+    build_stairs(well, index, lowest, highest, frame.height, builder);
+  }
+
+  // Furniture keeps off the way up.
+  part.things.push_back(
+      {options.lift ? "lift" : "stairs", options.lift ? "lift" : "stairs",
+       rectangle({0.0, 0.0}, 0.0, {well.x0 + 0.01, well.y0 + 0.01}, {well.x1 - 0.01, well.top()}), 0.0,
+       frame.pitch, index});
+
+  // Furniture on the free floor.
+  Ground ground(part);
+  ground.block(part.things.back().outline, false);
+  ground.recompute();
+  furnish(part, ground, random.things, builder);
+}
+
+/// A path over several storeys, piece by piece.
+class BuildingWalk {
+ public:
+  /// `storeys`: the walk on each; `height`: of the camera over the floor, metres.
+  BuildingWalk(const Plan& plan, const Stairwell& well, std::vector<RobotPath> storeys, double height)
+      : plan_(plan), well_(well), storeys_(std::move(storeys)), height_(height), path_(storeys_.front()) {
+    path_.waypoints.clear();
+  }
+
+  /// A storey's walk, at the height of its floor.
+  void tour(int k) {
+    for (Waypoint w : storeys_[static_cast<std::size_t>(k)].waypoints) {
+      const Vector3d lift(0.0, 0.0, plan_.storeys[static_cast<std::size_t>(k)] + height_ - w.position.z());
+      w.position += lift;
+      if (w.look) *w.look += lift;
+      path_.waypoints.push_back(w);
+    }
+  }
+
+  /// By the lift or on the stairs.
+  void change_storey(int from, int to) {
+    if (stairs_of(plan_)->kind != "lift") {
+      climb(from, to);
+    } else if (from != to) {
+      ride(from, to);
+    }
+  }
+
+  [[nodiscard]] const RobotPath& path() const { return path_; }
+
+ private:
+  /// The lift takes the camera from storey to storey.
+  void ride(int from, int to) {
+    const auto z = [&](int storey) { return plan_.storeys[static_cast<std::size_t>(storey)] + height_; };
+    for (const Vector3d& p : lift_ride(well_.shaft(), z(from), z(to))) {
+      Waypoint w;
+      w.position = p;
+      if (p.y() < well_.top() - 0.5) w.look = Vector3d(p.x(), well_.top() + 2.0, p.z() - 0.4);
+      path_.waypoints.push_back(w);
+    }
+  }
+
+  /// Storey by storey, up or down the stairs.
+  void climb(int from, int to) {
+    for (int k = from; k != to; k += to > from ? 1 : -1) {
+      std::vector<Vector3d> steps = well_.climb();
+      const double floor = plan_.storeys[static_cast<std::size_t>(to > from ? k : k - 1)];
+      if (to < from) std::reverse(steps.begin(), steps.end());
+      for (const Vector3d& p : steps) {
+        Waypoint w;
+        w.position = p + Vector3d(0.0, 0.0, floor + height_);
+        w.pitch_rad = -0.15;
+        path_.waypoints.push_back(w);
+      }
+    }
+  }
+
+  const Plan& plan_;
+  const Stairwell& well_;
+  std::vector<RobotPath> storeys_;
+  double height_;
+  RobotPath path_;
+};
+
 }  // namespace
 
 bool build_building(const SynthOptions& options, std::uint64_t seed, Scene& scene, Plan& plan) {
@@ -228,58 +349,17 @@ bool build_building(const SynthOptions& options, std::uint64_t seed, Scene& scen
 
   for (int storey = 0; storey < options.floors; ++storey) {
     // Each storey has independent random numbers.
-    const std::uint64_t own = mix(seed, static_cast<std::uint64_t>(storey) + 1);
-    Rng cells(own, 1), rooms(own, 2), openings(own, 3), shell(own, 4), things(own, 5);
+    StoreyRandom random(mix(seed, static_cast<std::uint64_t>(storey) + 1));
     Plan part;
     part.kind = plan.kind;
     part.number = plan.number;
     part.copies = plan.copies;
+    if (!plan_storey(options, frame, storey, random, part)) return false;
 
-    // Rooms of the storey.
-    const int alike = std::max(options.like, options.copies);
-    if (!add_rooms(draw_storey(frame, options.rooms, alike, options.hall && storey == 0, cells), rooms, part))
-      return false;
-
-    // Rooms end at the ceiling; stairs go through it.
-    const bool lowest = storey == 0, highest = storey + 1 == options.floors;
-    for (PlanRoom& room : part.rooms) {
-      room.height = std::min(room.height, frame.height);
-      if (room.kind == "stairs") room.height = highest ? frame.height : frame.pitch;
-    }
-
-    // Openings, with every room reachable.
-    if (!add_openings(openings, part)) return false;
-    clear_stairs(part);
-    const PlanRoom* stairs = stairs_of(part);
-    if (stairs == nullptr || !make_alike(part) || !connected(part)) return false;
-
-    // Built at height 0, raised below.
-    const double floor = storey * frame.pitch;
+    // Built at height 0, then raised to the storey's height.
     const std::size_t faces = scene.faces.size(), lamps = scene.lamps.size(), leaves = scene.leaves.size();
-    build_shell(part, shell, builder);
-    const Stairwell well(*stairs, frame.pitch);
-    const int index = static_cast<int>(stairs - part.rooms.data());
-
-    // One way up: lift or stairs.
-    if (options.lift) {
-      build_lift_storey(well.shaft(), index, lowest, highest, highest ? frame.height : frame.pitch, builder);
-    } else {
-      build_stairs(well, index, lowest, highest, frame.height, builder);
-    }
-
-    // Furniture keeps off the way up.
-    part.things.push_back(
-        {options.lift ? "lift" : "stairs", options.lift ? "lift" : "stairs",
-         rectangle({0.0, 0.0}, 0.0, {well.x0 + 0.01, well.y0 + 0.01}, {well.x1 - 0.01, well.top()}), 0.0,
-         frame.pitch, index});
-
-    // Furniture on the free floor.
-    Ground ground(part);
-    ground.block(part.things.back().outline, false);
-    ground.recompute();
-    furnish(part, ground, things, builder);
-
-    // Raised to the storey's height.
+    build_storey(options, frame, storey, random, part, builder);
+    const double floor = storey * frame.pitch;
     for (std::size_t i = faces; i < scene.faces.size(); ++i) scene.faces[i].origin.z() += floor;
     for (std::size_t i = lamps; i < scene.lamps.size(); ++i) scene.lamps[i].center.z() += floor;
     for (std::size_t i = leaves; i < scene.leaves.size(); ++i) scene.leaves[i].hinge.z() += floor;
@@ -314,67 +394,23 @@ RobotPath plan_building_path(const Plan& plan, Route route, int robot, Rng& rng)
     if (storeys.back().waypoints.empty()) return {};
   }
 
-  RobotPath path = storeys.front();
-  path.waypoints.clear();
-
-  // A storey's walk, at the height of its floor.
-  const auto tour = [&](int k) {
-    for (Waypoint w : storeys[static_cast<std::size_t>(k)].waypoints) {
-      const Vector3d lift(0.0, 0.0, plan.storeys[static_cast<std::size_t>(k)] + height - w.position.z());
-      w.position += lift;
-      if (w.look) *w.look += lift;
-      path.waypoints.push_back(w);
-    }
-  };
-
-  // The lift takes the camera from storey to storey.
-  const bool lift = stairs_of(plan)->kind == "lift";
-  const auto ride = [&](int from, int to) {
-    const auto z = [&](int storey) { return plan.storeys[static_cast<std::size_t>(storey)] + height; };
-    for (const Vector3d& p : lift_ride(well->shaft(), z(from), z(to))) {
-      Waypoint w;
-      w.position = p;
-      if (p.y() < well->top() - 0.5) w.look = Vector3d(p.x(), well->top() + 2.0, p.z() - 0.4);
-      path.waypoints.push_back(w);
-    }
-  };
-
-  const auto climb = [&](int from, int to) {
-    if (lift) {
-      if (from != to) ride(from, to);
-      return;
-    }
-
-    // Storey by storey, up or down the stairs.
-    for (int k = from; k != to; k += to > from ? 1 : -1) {
-      std::vector<Vector3d> steps = well->climb();
-      const double floor = plan.storeys[static_cast<std::size_t>(to > from ? k : k - 1)];
-      if (to < from) std::reverse(steps.begin(), steps.end());
-      for (const Vector3d& p : steps) {
-        Waypoint w;
-        w.position = p + Vector3d(0.0, 0.0, floor + height);
-        w.pitch_rad = -0.15;
-        path.waypoints.push_back(w);
-      }
-    }
-  };
-
   // Up from where it starts, then down over those below, and back.
+  BuildingWalk walk(plan, *well, std::move(storeys), height);
   int at = start;
-  tour(at);
+  walk.tour(at);
 
   for (int k = start + 1; k < floors; ++k) {
-    climb(k - 1, k);
-    tour(at = k);
+    walk.change_storey(k - 1, k);
+    walk.tour(at = k);
   }
 
   for (int k = start - 1; k >= 0; --k) {
-    climb(at, k);
-    tour(at = k);
+    walk.change_storey(at, k);
+    walk.tour(at = k);
   }
-  climb(at, start);
+  walk.change_storey(at, start);
 
-  return path;
+  return walk.path();
 }
 
 }  // namespace plumbline::synth
