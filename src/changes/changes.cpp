@@ -72,14 +72,14 @@ struct Cores {
 };
 
 /// Core points of the earlier or the later surface, with distances that leave out the registration's error.
-Cores measured_cores(const Surface& of, const Surface& before, const Surface& after,
-                     const ChangeOptions& options, const core::Executor& executor) {
+Cores measured_cores(const Surface& of, const SurfacePair& surfaces, const ChangeOptions& options,
+                     const core::Executor& executor) {
   Cores cores;
   for (const std::uint32_t i : core_points(of, options.spacing_m)) {
     cores.points.push_back(of.points[i]);
     cores.normals.push_back(of.normals[i]);
   }
-  cores.distances = distances(cores.points, cores.normals, before, after, 0.0, options.distance, executor);
+  cores.distances = distances(cores.points, cores.normals, surfaces, 0.0, options.distance, executor);
   return cores;
 }
 
@@ -211,13 +211,13 @@ class Listing {
 };
 
 /// All changes of the two maps: moved objects first, for their pieces must not be listed as lone ones too.
-std::vector<Change> list_changes(std::vector<Place>& places, const Surface& before, const Surface& after,
+std::vector<Change> list_changes(std::vector<Place>& places, const SurfacePair& surfaces,
                                  const Eigen::Vector3d& up, double registration_m,
                                  const ChangeOptions& options, const core::Executor& executor) {
   const std::vector<Piece> vanished = pieces_of(places, PlaceKind::kVanished, options);
   const std::vector<Piece> appeared = pieces_of(places, PlaceKind::kAppeared, options);
   const std::vector<Piece> shifted = pieces_of(places, PlaceKind::kShifted, options);
-  const std::vector<Move> moves = find_moves(places, vanished, appeared, before, after, up, executor);
+  const std::vector<Move> moves = find_moves(places, vanished, appeared, surfaces, up, executor);
 
   // Pieces that a motion explains
   Listing listing(places, options, registration_m);
@@ -264,12 +264,12 @@ const char* name_of(ChangeKind kind) {
   return kNames[static_cast<std::size_t>(kind)];
 }
 
-Comparison find_changes(const Surface& before, const Surface& after, const LookedThrough& through_before,
+Comparison find_changes(const SurfacePair& surfaces, const LookedThrough& through_before,
                         const LookedThrough& through_after, const Eigen::Vector3d& up,
                         const ChangeOptions& options, const core::Executor& executor) {
   Comparison result;
-  const Cores of_before = measured_cores(before, before, after, options, executor);
-  const Cores of_after = measured_cores(after, before, after, options, executor);
+  const Cores of_before = measured_cores(surfaces.before, surfaces, options, executor);
+  const Cores of_after = measured_cores(surfaces.after, surfaces, options, executor);
   result.registration_m = registration_sigma(of_before.points, of_before.normals, of_before.distances);
 
   // The limit of detection of a place needs the registration's error, which is known only now.
@@ -313,7 +313,7 @@ Comparison find_changes(const Surface& before, const Surface& after, const Looke
   const double both = count(PlaceKind::kSame) + count(PlaceKind::kShifted) + count(PlaceKind::kVanished) +
                       count(PlaceKind::kAppeared);
   result.agreement = near / std::max(1.0, both);
-  result.changes = list_changes(result.places, before, after, up, result.registration_m, options, executor);
+  result.changes = list_changes(result.places, surfaces, up, result.registration_m, options, executor);
   return result;
 }
 

@@ -231,7 +231,7 @@ core::Result<CompareSummary> compare_maps(const CompareRequest& request, const c
   // Maps that do not fit have no changes to list
   summary.placing = pair->shown.placing;
   summary.comparison =
-      find_changes(pair->before, pair->after, function_of(pair->space_before, executor),
+      find_changes({pair->before, pair->after}, function_of(pair->space_before, executor),
                    function_of(pair->space_after, executor), pair->shown.up, request.options, executor);
   if (auto fits = check_fit(summary.comparison, request); !fits)
     return tl::unexpected<core::Error>(fits.error());

@@ -53,13 +53,13 @@ double detection_limit(const CylinderPoints& before, const CylinderPoints& after
 
 /// M3C2 distances of all core points; places with too few points in either cloud stay unknown.
 std::vector<Distance> distances(const std::vector<Eigen::Vector3f>& cores,
-                                const std::vector<Eigen::Vector3f>& normals, const Surface& before,
-                                const Surface& after, double registration_m, const DistanceOptions& options,
+                                const std::vector<Eigen::Vector3f>& normals, const SurfacePair& surfaces,
+                                double registration_m, const DistanceOptions& options,
                                 const core::Executor& executor) {
   constexpr std::size_t kBlock = 1024;
 
   // Core points are independent, so blocks run in parallel
-  const PointSearch first(before.points), second(after.points);
+  const PointSearch first(surfaces.before.points), second(surfaces.after.points);
   const auto least = static_cast<std::uint32_t>(options.min_points);
   std::vector<Distance> result(cores.size());
 
@@ -68,8 +68,8 @@ std::vector<Distance> distances(const std::vector<Eigen::Vector3f>& cores,
 
     for (std::size_t i = block * kBlock; i < std::min(cores.size(), (block + 1) * kBlock); ++i) {
       Distance& d = result[i];
-      d.before = points_in_cylinder(before, first, cores[i], normals[i], options, found);
-      d.after = points_in_cylinder(after, second, cores[i], normals[i], options, found);
+      d.before = points_in_cylinder(surfaces.before, first, cores[i], normals[i], options, found);
+      d.after = points_in_cylinder(surfaces.after, second, cores[i], normals[i], options, found);
       if (d.before.count < least || d.after.count < least) continue;
       d.shift_m = static_cast<float>(d.after.mean_m - d.before.mean_m);
       d.limit_m = static_cast<float>(detection_limit(d.before, d.after, registration_m));

@@ -239,13 +239,12 @@ double goes_on(const Samples& thing, const Ground& ground, const Rigid3& motion)
 class Moves {
  public:
   Moves(const std::vector<Place>& places, const std::vector<Piece>& vanished,
-        const std::vector<Piece>& appeared, const Surface& before, const Surface& after,
-        const Eigen::Vector3d& up)
+        const std::vector<Piece>& appeared, const SurfacePair& surfaces, const Eigen::Vector3d& up)
       : up_(up),
         gone_(lone(places, false)),
         come_(lone(places, true)),
-        before_{before, PointSearch(before.points), PointSearch(gone_)},
-        after_{after, PointSearch(after.points), PointSearch(come_)} {
+        before_{surfaces.before, PointSearch(surfaces.before.points), PointSearch(gone_)},
+        after_{surfaces.after, PointSearch(surfaces.after.points), PointSearch(come_)} {
     // Every piece is tried with a limited number of its places
     for (const Piece& piece : vanished) vanished_.push_back(samples_of(places, piece, kSamples));
     for (const Piece& piece : appeared) appeared_.push_back(samples_of(places, piece, kSamples));
@@ -326,10 +325,10 @@ class Moves {
 }  // namespace
 
 std::vector<Move> find_moves(const std::vector<Place>& places, const std::vector<Piece>& vanished,
-                             const std::vector<Piece>& appeared, const Surface& before, const Surface& after,
+                             const std::vector<Piece>& appeared, const SurfacePair& surfaces,
                              const Eigen::Vector3d& up, const core::Executor& executor) {
   constexpr std::size_t kMost = 60;  // pieces that are tried, largest first
-  const Moves moves(places, vanished, appeared, before, after, up);
+  const Moves moves(places, vanished, appeared, surfaces, up);
 
   struct Try {
     std::size_t piece;

@@ -27,16 +27,16 @@ float depth_at(const cv::Mat& depth, double u, double v) {
 }  // namespace
 
 std::vector<optimize::PlaneTerm> associate_surface(const std::vector<WorldSurface>& surface,
-                                                   const cv::Mat& depth, const sensor::Pinhole& camera,
-                                                   const geometry::Rigid3& camera_from_world,
-                                                   const geometry::Rigid3& depth_from_camera,
+                                                   const PosedDepth& posed,
                                                    const SurfaceAssociationOptions& options, int* in_view) {
+  const cv::Mat& depth = posed.depth;
+  const sensor::Pinhole& camera = posed.camera;
   std::vector<optimize::PlaneTerm> terms;
   if (in_view != nullptr) *in_view = 0;
   if (depth.empty() || surface.empty()) return terms;
 
-  const geometry::Rigid3 depth_from_world = depth_from_camera * camera_from_world;
-  const geometry::Rigid3 camera_from_depth = depth_from_camera.inverse();
+  const geometry::Rigid3 depth_from_world = posed.depth_from_camera * posed.camera_from_world;
+  const geometry::Rigid3 camera_from_depth = posed.depth_from_camera.inverse();
   const geometry::Rigid3 world_from_depth = depth_from_world.inverse();
   terms.reserve(static_cast<std::size_t>(options.max_samples));
 

@@ -46,9 +46,9 @@ std::vector<LineCandidate> candidates_of(const features::FrameFeatures& frame) {
 }  // namespace
 
 std::vector<LineMatch> match_lines(const maps::Map& map, const std::vector<core::LineId>& lines,
-                                   const features::FrameFeatures& frame, const sensor::Pinhole& camera,
-                                   const geometry::Rigid3& camera_from_world, double radius,
-                                   const AssociationOptions& options, std::vector<core::LineId>* visible) {
+                                   const PosedFrame& posed, double radius, const AssociationOptions& options,
+                                   std::vector<core::LineId>* visible) {
+  const features::FrameFeatures& frame = posed.features;
   const auto min_cosine = static_cast<float>(std::cos(options.max_line_angle_rad));
   const std::vector<LineCandidate> candidates = candidates_of(frame);
   std::vector<LineMatch> by_feature(frame.lines.size());
@@ -56,7 +56,8 @@ std::vector<LineMatch> match_lines(const maps::Map& map, const std::vector<core:
   for (core::LineId id : lines) {
     const maps::MapLine* line = map.find(id);
     features::LineSegment predicted;
-    if (line == nullptr || !project_segment(*line, camera_from_world, camera, predicted)) continue;
+    if (line == nullptr || !project_segment(*line, posed.camera_from_world, posed.camera, predicted))
+      continue;
 
     if (visible != nullptr) visible->push_back(id);
     LineMatch best{id, -1, options.max_line_hamming + 1};

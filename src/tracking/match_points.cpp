@@ -15,18 +15,26 @@ struct Prediction {
   int octave = 0;
 };
 
-bool predict(const maps::MapPoint& point, const geometry::Rigid3& camera_from_world,
-             const Eigen::Vector3d& centre, const sensor::Pinhole& camera, double log_scale,
-             double octaves_closer, Prediction& prediction) {
-  const Eigen::Vector3d p = camera_from_world * point.position;
+/// A camera at a guess of its pose.
+struct Viewer {
+  const sensor::Pinhole& camera;
+  const geometry::Rigid3& camera_from_world;
+  Eigen::Vector3d centre;  ///< in the world
+  double log_scale;        ///< of one octave
+};
+
+/// False if the landmark is not in the image, or was seen from another side or distance.
+bool predict(const maps::MapPoint& point, const Viewer& viewer, double octaves_closer,
+             Prediction& prediction) {
+  const Eigen::Vector3d p = viewer.camera_from_world * point.position;
   if (p.z() < 0.1) return false;
-  const Eigen::Vector2d pixel = camera.project(p);
-  if (!camera.contains(pixel)) return false;
-  const Eigen::Vector3d ray = point.position - centre;
+  const Eigen::Vector2d pixel = viewer.camera.project(p);
+  if (!viewer.camera.contains(pixel)) return false;
+  const Eigen::Vector3d ray = point.position - viewer.centre;
   const double distance = ray.norm();
   if (ray.dot(point.view_direction) < 0.4 * distance) return false;  // seen from another side
-  const double octave =
-      point.reference_octave + std::log(point.reference_distance / distance) / log_scale + octaves_closer;
+  const double octave = point.reference_octave +
+                        std::log(point.reference_distance / distance) / viewer.log_scale + octaves_closer;
   // Many landmarks of another camera are smaller than anything that this one can see.
   const double beyond = octaves_closer == 0.0 ? 2.5 : 0.5;
   if (octave < -beyond || octave > 7.0 + beyond) return false;
@@ -119,13 +127,13 @@ void AssociationOptions::declare(core::OptionTable& table) {
 }
 
 std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<core::PointId>& points,
-                                     const features::FrameFeatures& frame, const sensor::Pinhole& camera,
-                                     const geometry::Rigid3& camera_from_world, double radius,
+                                     const PosedFrame& posed, double radius,
                                      const AssociationOptions& options, std::vector<core::PointId>* visible) {
-  const Eigen::Vector3d centre = camera_from_world.inverse().translation;
-  const double log_scale = std::log(options.scale_factor);
-  const std::vector<double> closer = octaves_closer(options.focals_px, camera, log_scale);
-  Roll roll(map, camera_from_world);
+  const features::FrameFeatures& frame = posed.features;
+  const Viewer viewer{posed.camera, posed.camera_from_world, posed.camera_from_world.inverse().translation,
+                      std::log(options.scale_factor)};
+  const std::vector<double> closer = octaves_closer(options.focals_px, viewer.camera, viewer.log_scale);
+  Roll roll(map, viewer.camera_from_world);
   const auto max_turn = static_cast<float>(options.max_point_angle_rad * 180.0 / 3.14159265358979);
   std::vector<PointMatch> by_feature(frame.points.size());
   std::vector<int> near;
@@ -136,11 +144,7 @@ std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<cor
     Prediction prediction;
     const auto robot = static_cast<std::size_t>(id.robot);
     const double octaves = robot < closer.size() ? closer[robot] : 0.0;
-    if (point == nullptr ||
-        !predict(*point, camera_from_world, centre, camera, log_scale, octaves, prediction)) {
-      continue;
-    }
-
+    if (point == nullptr || !predict(*point, viewer, octaves, prediction)) continue;
     if (visible != nullptr) visible->push_back(id);
 
     // Corners near the prediction, farther on coarse levels

@@ -12,20 +12,6 @@ constexpr float kSmoothTangent = 1.73F;  // up to 60 degrees from face on are sm
 constexpr float kLinkTangent = 3.73F;    // up to 75 degrees the surface is assumed to continue
 constexpr float kCreaseSigmas = 4.0F;
 
-/// Adds a pair of opposite neighbours to the sum and weight of each cell where both lie on the surface of
-/// `reference`. Pairs keep the mean of a slanted plane unbiased where the window is cut by a border or a
-/// jump.
-void accumulate(const float* before, const float* after, const float* reference, const float* gate,
-                float reach, int count, float* sum, float* weight) {
-  for (int i = 0; i < count; ++i) {
-    const float limit = gate[i] + reach * reference[i];
-    const float worst = std::max(std::abs(before[i] - reference[i]), std::abs(after[i] - reference[i]));
-    const float same = worst < limit ? 1.0F : 0.0F;
-    sum[i] += same * (before[i] + after[i]);
-    weight[i] += same + same;
-  }
-}
-
 /// Converts depth to 1/z; 0 where there is no measurement.
 void invert(const float* depth, int count, float min_depth, float max_depth, float* inverse) {
   for (int i = 0; i < count; ++i) {
@@ -46,8 +32,20 @@ struct Pass {
     std::copy(reference, reference + cells_, sum.begin());
     std::fill(weight.begin(), weight.end(), 1.0F);
   }
+  /// Adds a pair of opposite neighbours to each cell where both lie on the surface of `reference`. Pairs keep
+  /// the mean of a slanted plane unbiased where the window is cut by a border or a jump.
   void add(const float* before, const float* after, const float* reference, float reach) {
-    accumulate(before, after, reference, gate.data(), reach, cells_, sum.data(), weight.data());
+    const float* gates = gate.data();
+    float* sums = sum.data();
+    float* weights = weight.data();
+    const int count = cells_;
+    for (int i = 0; i < count; ++i) {
+      const float limit = gates[i] + reach * reference[i];
+      const float worst = std::max(std::abs(before[i] - reference[i]), std::abs(after[i] - reference[i]));
+      const float same = worst < limit ? 1.0F : 0.0F;
+      sums[i] += same * (before[i] + after[i]);
+      weights[i] += same + same;
+    }
   }
   /// A cell without measurement keeps the mean 0: its measured neighbours differ by more than any gate.
   void finish(float* mean) const {

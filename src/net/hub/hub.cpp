@@ -142,15 +142,22 @@ core::Result<std::unique_ptr<HubBus>> open_logged_bus(const NetworkOptions& opti
   });
 }
 
-/// Fuses the received maps in `folder`; the summary's `reason` says why the result may not be trusted.
-core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, const fs::path& folder,
-                                                  const HubServer::Collected& collected,
-                                                  const HubMeetings& meetings, const core::Executor& executor,
-                                                  core::Log& log, const pipeline::Progress& progress) {
+/// The data of all robots, in the hub's folder.
+struct Received {
+  const fs::path& folder;
+  const HubServer::Collected& collected;
+  const HubMeetings& meetings;
+};
+
+/// Fuses the received maps; the summary's `reason` says why the result may not be trusted.
+core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, const Received& received,
+                                                  const core::Executor& executor, core::Log& log,
+                                                  const pipeline::Progress& progress) {
   // Result in a folder below the received data
+  const fs::path& folder = received.folder;
   std::string reason;
   pipeline::FuseRequest last = request.fuse;
-  last.maps = received_maps(folder, collected, request.robots, reason);
+  last.maps = received_maps(folder, received.collected, request.robots, reason);
   last.output = folder / "fused";
   last.replace = true;
   // A run that was killed while it moved these has left some of them.
@@ -176,7 +183,8 @@ core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, con
   // The result moves into the hub's folder
   if (!reason.empty()) add_reason(reason, summary->reason);
   if (auto moved = move_all(last.output, folder); !moved) return tl::unexpected(moved.error());
-  if (auto added = add_network(folder / "summary.json", collected.traffic, meetings.meetings(), reason);
+  if (auto added = add_network(folder / "summary.json", received.collected.traffic,
+                               received.meetings.meetings(), reason);
       !added) {
     return tl::unexpected(added.error());
   }
@@ -220,7 +228,7 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
   const core::SideThread farewell([&](const core::StopToken& enough) {
     (*server)->publisher().publish_final(collected.final_statuses, enough);
   });
-  auto summary = fuse_collected(request, folder, collected, (*server)->meetings(), executor, log, progress);
+  auto summary = fuse_collected(request, {folder, collected, (*server)->meetings()}, executor, log, progress);
 
   // A failed fusion keeps the received data
   if (!summary) {

@@ -69,8 +69,7 @@ class Rate {
 
 /// Waits until the hub has received everything, or the robot gives up.
 core::Result<RobotOutcome> deliver(const RobotRequest& request, const fs::path& folder, const RobotLink& link,
-                                   RobotOutcome outcome, const core::StopToken& stop, bool was_stopped,
-                                   const Status& status) {
+                                   RobotOutcome outcome, const core::StopToken& stop, const Status& status) {
   // Shown to the user if nothing is delivered
   const std::string command = fmt::format("plumbline robot '{}' {}", folder.string(), request.hand_in);
   const auto since = Clock::now();
@@ -94,7 +93,7 @@ core::Result<RobotOutcome> deliver(const RobotRequest& request, const fs::path& 
     const auto waited_s = [](Clock::time_point from) {
       return std::chrono::duration<double>(Clock::now() - from).count();
     };
-    const bool stopped = stop.stop_requested() && !was_stopped;
+    const bool stopped = stop.stop_requested();
     if (!now.found && (stopped || waited_s(since) > request.wait_s)) {
       outcome.undelivered = fmt::format("no hub has answered; the map is in {}. To send it later: {}",
                                         folder.string(), command);
@@ -134,7 +133,7 @@ core::Result<RobotOutcome> hand_in(const RobotRequest& request, const fs::path& 
   if (!link) return tl::unexpected(link.error());
   if (auto followed = (*link)->follow(folder / kStore); !followed) return tl::unexpected(followed.error());
   (*link)->finish(folder / kStore);
-  return deliver(request, folder, **link, {}, stop, false, status);
+  return deliver(request, folder, **link, {}, stop, status);
 }
 
 core::Result<RobotOutcome> run_robot(const RobotRequest& request, const core::Executor& executor,
@@ -176,8 +175,9 @@ core::Result<RobotOutcome> run_robot(const RobotRequest& request, const core::Ex
   (*link)->finish(store);
   RobotOutcome outcome;
   outcome.summary = std::move(*summary);
-  return deliver(request, request.map.output, **link, std::move(outcome), stop, stop.stop_requested(),
-                 status);
+  const core::StopToken never;  // a stop that ended the mapping does not end the delivery
+  return deliver(request, request.map.output, **link, std::move(outcome),
+                 stop.stop_requested() ? never : stop, status);
 }
 
 }  // namespace plumbline::net
