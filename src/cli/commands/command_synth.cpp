@@ -41,7 +41,7 @@ core::Result<void> film(SynthRequest& request, Session& session) {
 
   // Cameras film the scene
   Console& console = session.console();
-  const auto summary = synth::write_recordings(*scene, request.options, request.output, session.executor(),
+  const auto summary = synth::write_recordings({*scene, request.options, request.output}, session.executor(),
                                                stop_on_signals(), console, console.counting("frames"));
   console.end_progress();
   if (!summary) return tl::unexpected<core::Error>(summary.error());

@@ -240,8 +240,8 @@ class Furnisher {
     item.frame = placed(item.frame, {x + 0.5 * item.size.x(), 0.0, z}, {0.0, Vector3d::UnitZ()});
     const bool framed = item.rule->type == "picture" || item.rule->type == "whiteboard";
     begin(item.rule->type);
-    add_panel(b_, item.frame, item.size.x(), item.size.z(), 0.008, item.material,
-              framed ? "metal" : "paint_white", framed);
+    add_panel(b_, item.frame,
+              {item.size.x(), item.size.z(), 0.008, item.material, framed ? "metal" : "paint_white", framed});
     return true;
   }
 

@@ -62,7 +62,7 @@ void build_lift_storey(const LiftShaft& shaft, int index, bool lowest, bool high
 
   // A sign and a lamp in the lobby.
   b.begin_object("sign", fmt::format("sign of lift {}", index), mark);
-  add_panel(b, upright({m + kHalf + 0.45, shaft.door, 1.5}, M_PI), 0.5, 0.7, 0.02, "sign", "metal", false);
+  add_panel(b, upright({m + kHalf + 0.45, shaft.door, 1.5}, M_PI), {0.5, 0.7, 0.02, "sign", "metal", false});
   b.begin_object("lamp", "", mark);
   add_ceiling_lamp(b, upright({m, 0.5 * (shaft.door + high.y()), top}, 0.0), 0.5, 0.5, 9.0);
 
@@ -99,7 +99,7 @@ void add_lift(const LiftShaft& shaft, const std::vector<double>& storeys, Scene&
   b.box({}, {left - wall, back, 0.0}, {left, y - 0.02, kCabHeight}, {"wood"});
   b.box({}, {right, back, 0.0}, {right + wall, y - 0.02, kCabHeight}, {"wood"});
   b.box({}, {left, back - wall, 0.0}, {right, back, kCabHeight}, {"metal"});
-  add_panel(b, upright({m, back, 1.5}, M_PI), 0.7, 0.9, 0.02, "poster", "wood_dark", false);
+  add_panel(b, upright({m, back, 1.5}, M_PI), {0.7, 0.9, 0.02, "poster", "wood_dark", false});
   moves("lift", first, {0.0, 0.0, storeys.back()});
 
   // Two leaves on every storey, built shut.

@@ -16,17 +16,26 @@ static const std::array<const char*, 24> kWords = {"ROBOT", "mapping", "the",   
                                                    "loop",  "2024",    "sensor", "a",      "light", "camera",
                                                    "frame", "in",      "model",  "error",  "scale", "GRAPH"};
 
+namespace {
+/// How text is written.
+struct Pen {
+  double scale;
+  cv::Scalar color;
+  int thick;  ///< px
+};
+}  // namespace
+
 /// Random words from left to right, as many as fit.
-static void text_line(Canvas& canvas, cv::Point at, int width, double scale, const cv::Scalar& color,
-                      int thick, Rng& rng) {
+static void text_line(Canvas& canvas, cv::Point at, int width, const Pen& pen, Rng& rng) {
   int x = at.x;
   while (true) {
     const std::string word = kWords[static_cast<std::size_t>(rng.uniform(0.0, 23.999))];
     int base = 0;
-    const cv::Size extent = cv::getTextSize(word, cv::FONT_HERSHEY_SIMPLEX, scale, thick, &base);
+    const cv::Size extent = cv::getTextSize(word, cv::FONT_HERSHEY_SIMPLEX, pen.scale, pen.thick, &base);
     if (x + extent.width > at.x + width) return;
-    cv::putText(canvas, word, {x, at.y}, cv::FONT_HERSHEY_SIMPLEX, scale, color, thick, cv::LINE_AA);
-    x += extent.width + static_cast<int>(14 * scale);
+    cv::putText(canvas, word, {x, at.y}, cv::FONT_HERSHEY_SIMPLEX, pen.scale, pen.color, pen.thick,
+                cv::LINE_AA);
+    x += extent.width + static_cast<int>(14 * pen.scale);
   }
 }
 
@@ -76,8 +85,9 @@ Canvas draw_poster(const Material&, cv::Size size, std::uint64_t seed) {
   const cv::Scalar ink = pale ? cv::Scalar::all(0.04) : cv::Scalar::all(0.85);
   const int w = size.width, h = size.height, margin = w / 14;
   const double unit = w / 512.0;
-  text_line(canvas, {margin, h / 9}, w - 2 * margin, 2.2 * unit, random_color(rng, 0.0, pale ? 0.4 : 0.9),
-            std::max(2, static_cast<int>(5 * unit)), rng);
+  text_line(canvas, {margin, h / 9}, w - 2 * margin,
+            {2.2 * unit, random_color(rng, 0.0, pale ? 0.4 : 0.9), std::max(2, static_cast<int>(5 * unit))},
+            rng);
 
   // An image below the title.
   const int top = h / 7, photo = static_cast<int>(h * rng.uniform(0.25, 0.42));
@@ -98,7 +108,7 @@ Canvas draw_poster(const Material&, cv::Size size, std::uint64_t seed) {
                    cv::LINE_AA);
         y += h / 7;
       } else {
-        text_line(canvas, {x, y}, width, 0.62 * unit, ink, std::max(1, static_cast<int>(1.6 * unit)), rng);
+        text_line(canvas, {x, y}, width, {0.62 * unit, ink, std::max(1, static_cast<int>(1.6 * unit))}, rng);
         y += static_cast<int>(24 * unit);
       }
     }
@@ -132,7 +142,7 @@ Canvas draw_whiteboard(const Material& m, cv::Size size, std::uint64_t seed) {
       cv::rectangle(canvas, at, at + cv::Point(s, s / 2), pen, 3, cv::LINE_AA);
       cv::arrowedLine(canvas, at + cv::Point(s, s / 4), at + cv::Point(2 * s, s / 4), pen, 3, cv::LINE_AA);
     } else if (i % 3 == 1) {
-      for (int k = 0; k < 3; ++k) text_line(canvas, at + cv::Point(0, 34 * k), 2 * s, 0.9, pen, 2, rng);
+      for (int k = 0; k < 3; ++k) text_line(canvas, at + cv::Point(0, 34 * k), 2 * s, {0.9, pen, 2}, rng);
     } else {
       std::vector<cv::Point> curve;
       const double f = rng.uniform(0.02, 0.07), a = rng.uniform(10, 40);
@@ -157,7 +167,7 @@ Canvas draw_sign(const Material&, cv::Size size, std::uint64_t seed) {
   const std::string number = std::to_string(static_cast<int>(rng.uniform(100, 999)));
   cv::putText(canvas, number, {w / 8, 6 * h / 10}, cv::FONT_HERSHEY_DUPLEX, h / 62.0, cv::Scalar::all(0.88),
               h / 30 + 1, cv::LINE_AA);
-  text_line(canvas, {w / 8, 17 * h / 20}, 3 * w / 4, h / 220.0, cv::Scalar::all(0.85), h / 110 + 1, rng);
+  text_line(canvas, {w / 8, 17 * h / 20}, 3 * w / 4, {h / 220.0, cv::Scalar::all(0.85), h / 110 + 1}, rng);
   return canvas;
 }
 
@@ -208,8 +218,8 @@ Canvas draw_screen(const Material&, cv::Size size, std::uint64_t seed) {
   cv::rectangle(canvas, {0, 0}, {size.width, size.height / 16}, cv::Scalar(0.35, 0.28, 0.2), -1);
   for (int y = size.height / 9; y < size.height - 12; y += size.height / 24) {
     const int indent = static_cast<int>(rng.uniform(0.02, 0.2) * size.width);
-    text_line(canvas, {indent, y}, static_cast<int>(rng.uniform(0.1, 0.6) * size.width), 0.4,
-              random_color(rng, 0.2, 0.9), 1, rng);
+    const Pen pen{0.4, random_color(rng, 0.2, 0.9), 1};
+    text_line(canvas, {indent, y}, static_cast<int>(rng.uniform(0.1, 0.6) * size.width), pen, rng);
   }
   return canvas;
 }

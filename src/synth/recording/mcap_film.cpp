@@ -43,23 +43,22 @@ class RenderedAhead final : public dataset::FrameSource {
 
 }  // namespace
 
-core::Result<std::size_t> write_mcap(const SynthSource& source, const std::filesystem::path& file,
-                                     const dataset::BodyReadings* body, const core::Executor& executor,
-                                     const core::StopToken& stop, const Progress& progress, core::Log& log) {
-  if (stop.stop_requested()) return std::size_t{0};
+core::Result<std::size_t> write_mcap(const RecordingJob& job, const std::filesystem::path& file,
+                                     const dataset::BodyReadings& body) {
+  if (job.run.stop.stop_requested()) return std::size_t{0};
   dataset::ConvertOptions options;
-  options.body = body;
+  options.body = &body;
   std::size_t done = 0;
 
   // A stopped file holds at least one frame.
-  options.stop = [&] { return done > 0 && stop.stop_requested(); };
+  options.stop = [&] { return done > 0 && job.run.stop.stop_requested(); };
   options.progress = [&](std::size_t frames) {
     done = frames;
-    if (progress) progress(frames, source.size());
+    if (job.progress) job.progress(frames, job.source.size());
   };
 
-  const RenderedAhead ahead(source, executor);
-  const auto summary = dataset::convert_recording(ahead, file, options, log);
+  const RenderedAhead ahead(job.source, job.run.executor);
+  const auto summary = dataset::convert_recording(ahead, file, options, job.run.log);
   if (!summary) return tl::unexpected<core::Error>(summary.error());
   return summary->written;
 }

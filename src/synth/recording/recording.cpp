@@ -110,28 +110,17 @@ Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs
   return dataset::write_trajectory(folder / "groundtruth.txt", truth);
 }
 
-/// State of one robot's recording.
-struct Job {
-  const SynthSource& source;
-  const SynthOptions& options;
-  fs::path folder;
-  std::uint64_t seed;
-  const core::Executor& executor;
-  const core::StopToken& stop;
-  Progress progress;  ///< frames of this recording, and all of them
-};
-
 /// Writes pictures; returns the number of frames, smaller than the total if stopped.
-Result<std::size_t> write_pictures(const Job& job) {
-  const std::size_t batch = static_cast<std::size_t>(job.executor.threads()) * 4;
+Result<std::size_t> write_pictures(const RecordingJob& job) {
+  const std::size_t batch = static_cast<std::size_t>(job.run.executor.threads()) * 4;
   std::size_t done = 0;
 
-  while (done < job.source.size() && !job.stop.stop_requested()) {
+  while (done < job.source.size() && !job.run.stop.stop_requested()) {
     // The first round is written before it is repeated.
     const std::size_t end = done < job.source.round() ? job.source.round() : job.source.size();
     const std::size_t count = std::min(batch, end - done);
     std::vector<std::string> problems(count);
-    job.executor.parallel_for(
+    job.run.executor.parallel_for(
         count, [&](std::size_t i) { problems[i] = write_pair(job.source, done + i, job.folder); });
 
     // The first problem ends the recording.
@@ -146,11 +135,11 @@ Result<std::size_t> write_pictures(const Job& job) {
 }
 
 /// Truth beside the first `frames` frames.
-Result<void> write_truth(const Job& job, std::size_t frames) {
+Result<void> write_truth(const RecordingJob& job, std::size_t frames) {
   // Share of moving pixels, once per round.
   const std::size_t round = std::min(frames, job.source.round());
   std::vector<Result<double>> shares(round, 0.0);
-  job.executor.parallel_for(round, [&](std::size_t i) {
+  job.run.executor.parallel_for(round, [&](std::size_t i) {
     shares[i] = write_moving(job.source, i, job.folder, job.options.moving_masks);
   });
 
@@ -182,7 +171,7 @@ Result<void> write_truth(const Job& job, std::size_t frames) {
 }
 
 /// Returns the number of frames written; smaller than the total if stopped.
-Result<std::size_t> write_frames(const Job& job, core::Log& log) {
+Result<std::size_t> write_frames(const RecordingJob& job) {
   auto ok = core::make_folder(job.folder);
   for (const auto& [sub, wanted] :
        {std::pair("rgb", !job.options.mcap), std::pair("depth", !job.options.mcap),
@@ -203,9 +192,7 @@ Result<std::size_t> write_frames(const Job& job, core::Log& log) {
   if (!ok) return tl::unexpected<core::Error>(ok.error());
 
   // Pictures, in one file or in many.
-  auto done = job.options.mcap ? write_mcap(job.source, job.folder / "recording.mcap", &body, job.executor,
-                                            job.stop, job.progress, log)
-                               : write_pictures(job);
+  auto done = job.options.mcap ? write_mcap(job, job.folder / "recording.mcap", body) : write_pictures(job);
   if (!done) return done;
 
   // Truth of the frames written, even if stopped.
@@ -238,32 +225,33 @@ Result<std::vector<std::unique_ptr<SynthSource>>> open_all(const std::shared_ptr
 }
 
 /// Writes the recording of each robot; returns their entries in scene.json.
-Result<nlohmann::json> write_robots(const std::vector<std::unique_ptr<SynthSource>>& sources,
-                                    const Scene& scene, const SynthOptions& options, const fs::path& output,
-                                    const core::Executor& executor, const core::StopToken& stop,
-                                    core::Log& log, const Progress& progress, WriteSummary& summary) {
+Result<nlohmann::json> write_robots(const WriteRequest& request,
+                                    const std::vector<std::unique_ptr<SynthSource>>& sources,
+                                    const RecordingRun& run, const Progress& progress,
+                                    WriteSummary& summary) {
+  const Scene& scene = request.scene;
+  const SynthOptions& options = request.options;
   summary.robots = static_cast<int>(sources.size());
   std::size_t all_frames = 0;
   for (const auto& source : sources) all_frames += source->size();
   const auto start = std::chrono::steady_clock::now();
   nlohmann::json robots = nlohmann::json::array();
 
-  for (std::size_t i = 0; i < sources.size() && !stop.stop_requested(); ++i) {
+  for (std::size_t i = 0; i < sources.size() && !run.stop.stop_requested(); ++i) {
     const std::string folder = folder_name(static_cast<int>(i));
     const std::size_t before = summary.frames;
 
     // Progress counts the frames of all recordings.
-    const Job job{*sources[i],
-                  options,
-                  output / folder,
-                  mix(static_cast<std::uint64_t>(options.seed), options.rig.empty() ? i + 1 : 1),
-                  executor,
-                  stop,
-                  [&](std::size_t done, std::size_t) {
-                    if (progress) progress(before + done, all_frames);
-                  }};
+    const RecordingJob job{*sources[i],
+                           options,
+                           request.output / folder,
+                           mix(static_cast<std::uint64_t>(options.seed), options.rig.empty() ? i + 1 : 1),
+                           run,
+                           [&](std::size_t done, std::size_t) {
+                             if (progress) progress(before + done, all_frames);
+                           }};
 
-    const auto written = write_frames(job, log);
+    const auto written = write_frames(job);
     if (!written) return tl::unexpected<core::Error>(written.error());
     summary.frames += *written;
     summary.path_m += sources[i]->path_length();
@@ -319,9 +307,9 @@ Result<void> write_plan(const Scene& scene, const std::vector<std::unique_ptr<Sy
 
 }  // namespace
 
-Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& options, const fs::path& output,
-                                      const core::Executor& executor, const core::StopToken& stop,
-                                      core::Log& log, const Progress& progress) {
+Result<WriteSummary> write_recordings(const WriteRequest& request, const core::Executor& executor,
+                                      const core::StopToken& stop, core::Log& log, const Progress& progress) {
+  const auto& [scene, options, output] = request;
   const auto fail = [](const core::Error& e) { return tl::unexpected<core::Error>(e); };
 
   // Refused before any work is done.
@@ -335,7 +323,7 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
 
   // All recordings, then the surfaces that they saw.
   WriteSummary summary;
-  const auto robots = write_robots(*sources, scene, options, output, executor, stop, log, progress, summary);
+  const auto robots = write_robots(request, *sources, {executor, stop, log}, progress, summary);
   if (!robots) return fail(robots.error());
   summary.reference_spacing_m =
       options.reference_spacing > 0.0 ? options.reference_spacing : default_spacing(scene);

@@ -97,35 +97,43 @@ class EdgeTiles {
     Spot from = project(a), to = project(b);
     if (std::abs(to.x - from.x) >= std::abs(to.y - from.y)) {
       if (from.x > to.x) std::swap(from, to);
-      march(from.x, from.y, to.x, to.y, from.inverse_depth, to.inverse_depth, columns_, rows_, 1, columns_);
+      march(from, to, {columns_, rows_, 1, columns_});
     } else {
       if (from.y > to.y) std::swap(from, to);
-      march(from.y, from.x, to.y, to.x, from.inverse_depth, to.inverse_depth, rows_, columns_, columns_, 1);
+      march({from.y, from.x, from.inverse_depth}, {to.y, to.x, to.inverse_depth},
+            {rows_, columns_, columns_, 1});
     }
   }
 
-  /// Walks from s0 to s1 along the edge's longer axis, tile by tile; t is the other coordinate, w the inverse
-  /// depth; all three change linearly over the picture.
-  void march(double s0, double t0, double s1, double t1, double w0, double w1, int along, int across,
-             int stride_s, int stride_t) {
-    constexpr double kMargin = 1.0;  // px
-    const double length = std::max(s1 - s0, 1e-9), slope = (t1 - t0) / length, rate = (w1 - w0) / length;
-    const double begin = std::max(s0 - kMargin, 0.0), end = std::min(s1 + kMargin, along * kTile - 1e-6);
+  /// Tiles along an edge's longer axis and across it, and how far apart neighbours are stored.
+  struct Axes {
+    int along, across, stride_along, stride_across;
+  };
 
-    for (int i = static_cast<int>(begin / kTile); i < along && i * kTile <= end; ++i) {
+  /// Walks tile by tile along the edge's longer axis, which is x of both spots; y and the inverse depth
+  /// change linearly over the picture.
+  void march(const Spot& start, const Spot& stop, const Axes& axes) {
+    constexpr double kMargin = 1.0;  // px
+    const double length = std::max(stop.x - start.x, 1e-9), slope = (stop.y - start.y) / length,
+                 rate = (stop.inverse_depth - start.inverse_depth) / length;
+    const double begin = std::max(start.x - kMargin, 0.0),
+                 end = std::min(stop.x + kMargin, axes.along * kTile - 1e-6);
+
+    for (int i = static_cast<int>(begin / kTile); i < axes.along && i * kTile <= end; ++i) {
       // The edge's part in this column of tiles.
-      const double from = std::max(begin, static_cast<double>(i * kTile)) - s0 - kMargin,
-                   to = std::min(end, static_cast<double>((i + 1) * kTile)) - s0 + kMargin;
-      const double ta = t0 + from * slope, tb = t0 + to * slope;
+      const double from = std::max(begin, static_cast<double>(i * kTile)) - start.x - kMargin,
+                   to = std::min(end, static_cast<double>((i + 1) * kTile)) - start.x + kMargin;
+      const double ta = start.y + from * slope, tb = start.y + to * slope;
       const double low = std::min(ta, tb) - kMargin, high = std::max(ta, tb) + kMargin;
-      if (high < 0.0 || low >= across * kTile) continue;
+      if (high < 0.0 || low >= axes.across * kTile) continue;
 
       // The nearest edge of each tile.
       const int first = static_cast<int>(std::max(low, 0.0) / kTile),
-                last = std::min(static_cast<int>(high / kTile), across - 1);
-      const auto w = static_cast<float>(std::max(w0 + from * rate, w0 + to * rate));
+                last = std::min(static_cast<int>(high / kTile), axes.across - 1);
+      const auto w =
+          static_cast<float>(std::max(start.inverse_depth + from * rate, start.inverse_depth + to * rate));
       for (int j = first; j <= last; ++j) {
-        float& nearest = nearest_[static_cast<std::size_t>(i * stride_s + j * stride_t)];
+        float& nearest = nearest_[static_cast<std::size_t>(i * axes.stride_along + j * axes.stride_across)];
         nearest = std::max(nearest, w);
       }
     }

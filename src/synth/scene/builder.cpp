@@ -99,18 +99,17 @@ void Builder::box(const Rigid3& f, const Vector3d& lo, const Vector3d& hi, const
   polygon({p(0, 1, 0), p(1, 1, 0), p(1, 0, 0), p(0, 0, 0)}, ux, skin);   // bottom, -z
 }
 
-void Builder::cylinder(const Rigid3& f, const Vector3d& bottom, double radius, double top_radius,
-                       double height, int segments, const Skin& skin) {
+void Builder::cylinder(const Rigid3& f, const Cylinder& of, const Skin& skin) {
   const auto ring = [&](int i, double r, double z) {
-    const double angle = 2.0 * M_PI * i / segments;
-    return Vector3d(f * (bottom + Vector3d(r * std::cos(angle), r * std::sin(angle), z)));
+    const double angle = 2.0 * M_PI * i / of.segments;
+    return Vector3d(f * (of.bottom + Vector3d(r * std::cos(angle), r * std::sin(angle), z)));
   };
 
   // Sides, collecting both rims.
   std::vector<Vector3d> top, foot;
-  for (int i = 0; i < segments; ++i) {
-    const Vector3d a = ring(i, radius, 0.0), b = ring(i + 1, radius, 0.0);
-    const Vector3d c = ring(i + 1, top_radius, height), d = ring(i, top_radius, height);
+  for (int i = 0; i < of.segments; ++i) {
+    const Vector3d a = ring(i, of.radius, 0.0), b = ring(i + 1, of.radius, 0.0);
+    const Vector3d c = ring(i + 1, of.top_radius, of.height), d = ring(i, of.top_radius, of.height);
     polygon({a, b, c, d}, b - a, skin);
     top.push_back(d);
     foot.insert(foot.begin(), a);

@@ -44,7 +44,7 @@ void add_chair(Builder& b, const Rigid3& f, const std::string& material) {
   b.box(f, {-0.03, 0.20, 0.42}, {0.03, 0.235, 0.60}, {"plastic_black"});
 
   // Column, base and casters.
-  b.cylinder(f, {0.0, 0.0, 0.08}, 0.028, 0.028, 0.36, 10, {"metal"});
+  b.cylinder(f, {{0.0, 0.0, 0.08}, 0.028, 0.028, 0.36, 10}, {"metal"});
   for (int i = 0; i < 5; ++i) {
     const Rigid3 arm = placed(f, Vector3d::Zero(), {2.0 * M_PI * i / 5.0 + 0.3, Vector3d::UnitZ()});
     b.box(arm, {0.02, -0.02, 0.06}, {0.30, 0.02, 0.09}, {"plastic_black"});
@@ -147,8 +147,8 @@ void add_plant(Builder& b, const Rigid3& f, double height) {
   const double pot = 0.3 * height;
 
   // Pot and stem.
-  b.cylinder(f, Vector3d::Zero(), 0.11, 0.15, pot, 16, {"terracotta"});
-  b.cylinder(f, {0.0, 0.0, pot}, 0.015, 0.008, 0.55 * height, 6, {"leaf"});
+  b.cylinder(f, {Vector3d::Zero(), 0.11, 0.15, pot, 16}, {"terracotta"});
+  b.cylinder(f, {{0.0, 0.0, pot}, 0.015, 0.008, 0.55 * height, 6}, {"leaf"});
   Rng rng(static_cast<std::uint64_t>(b.seed()), 0x91a7);
 
   // Leaves around the stem.
@@ -187,9 +187,9 @@ void add_lamp(Builder& b, const Rigid3& f, const Vector3d& center, double hu, do
 }  // namespace
 
 void add_floor_lamp(Builder& b, const Rigid3& f, double height, double power) {
-  b.cylinder(f, Vector3d::Zero(), 0.14, 0.13, 0.025, 20, {"metal"});
-  b.cylinder(f, {0.0, 0.0, 0.025}, 0.012, 0.012, height - 0.25, 8, {"metal"});
-  b.cylinder(f, {0.0, 0.0, height - 0.26}, 0.19, 0.13, 0.26, 20, {"lampshade"});
+  b.cylinder(f, {Vector3d::Zero(), 0.14, 0.13, 0.025, 20}, {"metal"});
+  b.cylinder(f, {{0.0, 0.0, 0.025}, 0.012, 0.012, height - 0.25, 8}, {"metal"});
+  b.cylinder(f, {{0.0, 0.0, height - 0.26}, 0.19, 0.13, 0.26, 20}, {"lampshade"});
   add_lamp(b, f, {0.0, 0.0, height - 0.29}, 0.12, 0.12, power);
 }
 
@@ -214,8 +214,8 @@ void add_clutter(Builder& b, const Rigid3& f, double width, double depth, int co
 
     // Cups, else books and boxes.
     if (kind < 0.25) {
-      b.cylinder(item, Vector3d::Zero(), 0.038, 0.042, rng.uniform(0.09, 0.13), 14,
-                 {rng.uniform() < 0.5 ? "ceramic" : "plastic_blue"});
+      const Skin skin{rng.uniform() < 0.5 ? "ceramic" : "plastic_blue"};
+      b.cylinder(item, {Vector3d::Zero(), 0.038, 0.042, rng.uniform(0.09, 0.13), 14}, skin);
     } else {
       const double w = std::min(0.5 * cell, rng.uniform(0.07, 0.16)), d = rng.uniform(0.08, 0.14);
       const double h = kind < 0.6 ? rng.uniform(0.015, 0.05) : rng.uniform(0.08, 0.22);
@@ -244,19 +244,18 @@ void add_curtain(Builder& b, const Rigid3& f, double width, double height, doubl
   }
 }
 
-void add_panel(Builder& b, const Rigid3& f, double width, double height, double thickness,
-               const std::string& material, const std::string& rim, bool frame_bars) {
-  const double x = 0.5 * width, z = 0.5 * height;
-  const Skin print{material, true};
-  b.box(f, {-x, -thickness, -z}, {x, 0.0, z}, {rim}, &print);
-  if (!frame_bars) return;
+void add_panel(Builder& b, const Rigid3& f, const Panel& panel) {
+  const double x = 0.5 * panel.width, z = 0.5 * panel.height;
+  const Skin print{panel.print, true}, rim{panel.rim};
+  b.box(f, {-x, -panel.thickness, -z}, {x, 0.0, z}, rim, &print);
+  if (!panel.bars) return;
 
   // Bars around the print.
-  const double bar = 0.03, out = thickness + 0.012;
-  b.box(f, {-x - bar, -out, -z - bar}, {-x, 0.0, z + bar}, {rim});
-  b.box(f, {x, -out, -z - bar}, {x + bar, 0.0, z + bar}, {rim});
-  b.box(f, {-x, -out, z}, {x, 0.0, z + bar}, {rim});
-  b.box(f, {-x, -out, -z - bar}, {x, 0.0, -z}, {rim});
+  const double bar = 0.03, out = panel.thickness + 0.012;
+  b.box(f, {-x - bar, -out, -z - bar}, {-x, 0.0, z + bar}, rim);
+  b.box(f, {x, -out, -z - bar}, {x + bar, 0.0, z + bar}, rim);
+  b.box(f, {-x, -out, z}, {x, 0.0, z + bar}, rim);
+  b.box(f, {-x, -out, -z - bar}, {x, 0.0, -z}, rim);
 }
 
 }  // namespace plumbline::synth

@@ -286,8 +286,9 @@ void read_cylinder(const Context& c) {
   r.point("at", at, 3).length("radius", radius, 0.001, 50.0).length("top_radius", top_radius, 0.001, 50.0);
   r.length("height", height, 0.001, 50.0).count("segments", segments, 3, 256).material("material", material);
   if (!begin(c, r)) return;
-  c.builder.cylinder(upright(to3(at), 0.0), Vector3d::Zero(), radius, top_radius > 0.0 ? top_radius : radius,
-                     height, segments, {material});
+  c.builder.cylinder(upright(to3(at), 0.0),
+                     {Vector3d::Zero(), radius, top_radius > 0.0 ? top_radius : radius, height, segments},
+                     {material});
 }
 
 /// Posters, whiteboards, signs and pictures: flat things that hang; yaw 0 looks to -y.
@@ -309,11 +310,8 @@ void read_panel(const Context& c) {
   // The print is the first face added.
   const std::size_t first = c.builder.scene().faces.size();
   const bool framed = c.type == "whiteboard" || c.type == "picture";
-  add_panel(c.builder, upright(to3(at), yaw), size[0], size[1], thickness, material,
-            c.type == "picture" ? "wood_dark"
-            : framed            ? "metal"
-                                : "paint_white",
-            framed);
+  const char* rim = c.type == "picture" ? "wood_dark" : framed ? "metal" : "paint_white";
+  add_panel(c.builder, upright(to3(at), yaw), {size[0], size[1], thickness, material, rim, framed});
   if (seed >= 0) c.builder.scene().faces[first].seed = seed;
 }
 

@@ -10,9 +10,14 @@ using geometry::Rigid3;
 
 namespace {
 
+/// A rectangle of a wall, m along it and above its foot.
+struct WallPiece {
+  double x0, x1, z0, z1;
+};
+
 /// One solid piece of a wall; texture coordinates count from the wall's foot, so pieces continue each other.
-void add_piece(Builder& b, const Rigid3& frame, const Wall& wall, double x0, double x1, double z0,
-               double z1) {
+void add_piece(Builder& b, const Rigid3& frame, const Wall& wall, const WallPiece& piece) {
+  const auto [x0, x1, z0, z1] = piece;
   if (x1 - x0 < 1e-6 || z1 - z0 < 1e-6) return;
   const double half = 0.5 * wall.thickness;
   const std::size_t first = b.scene().faces.size();
@@ -88,13 +93,13 @@ void add_wall(Builder& b, const Wall& wall) {
   // Around the openings.
   double x = 0.0;
   for (const Opening& o : wall.openings) {
-    add_piece(b, frame, wall, x, o.at, 0.0, wall.height);
-    add_piece(b, frame, wall, o.at, o.at + o.width, 0.0, o.bottom);
-    add_piece(b, frame, wall, o.at, o.at + o.width, o.bottom + o.height, wall.height);
+    add_piece(b, frame, wall, {x, o.at, 0.0, wall.height});
+    add_piece(b, frame, wall, {o.at, o.at + o.width, 0.0, o.bottom});
+    add_piece(b, frame, wall, {o.at, o.at + o.width, o.bottom + o.height, wall.height});
     x = o.at + o.width;
   }
 
-  add_piece(b, frame, wall, x, along.norm(), 0.0, wall.height);
+  add_piece(b, frame, wall, {x, along.norm(), 0.0, wall.height});
 
   // Frames, glass and leaves.
   for (const Opening& o : wall.openings) {
