@@ -14,6 +14,7 @@ namespace {
 
 using core::KeyframeId;
 
+/// The keyframes of the tree below `root`, itself included.
 std::set<KeyframeId> members(const Map& map, KeyframeId root) {
   std::set<KeyframeId> found;
   std::vector<KeyframeId> open{root};
@@ -42,6 +43,7 @@ void add_landmarks(const Map& map, const std::vector<Id>& ids, const std::set<Ke
 
 /// These keyframes as a map of their own; each is attached to its nearest ancestor among them.
 Map selection(const Map& map, const std::set<KeyframeId>& inside) {
+  // Parents outside are replaced by member ancestors
   const MapChanges whole = map.changes_since({});
   MapParts parts;
   for (const MapParts::KeyframePart& keyframe : whole.keyframes) {
@@ -50,9 +52,11 @@ Map selection(const Map& map, const std::set<KeyframeId>& inside) {
     while (parent.valid() && inside.count(parent) == 0) parent = map.parent(parent);
   }
 
+  // Landmarks lose their observations by outsiders
   add_landmarks(map, map.point_ids(), inside, parts.points);
   add_landmarks(map, map.line_ids(), inside, parts.lines);
 
+  // Only constraints with both ends inside
   const auto between_members = [&](const auto& edge) {
     return inside.count(edge.a) != 0 && inside.count(edge.b) != 0;
   };
@@ -61,6 +65,7 @@ Map selection(const Map& map, const std::set<KeyframeId>& inside) {
   }
   std::copy_if(whole.loops.begin(), whole.loops.end(), std::back_inserter(parts.loops), between_members);
 
+  // Numbers are never given twice
   parts.next = whole.next;
   return Map(std::move(parts));
 }
@@ -82,6 +87,7 @@ std::vector<KeyframeId> roots(const Map& map) {
 
 Map component(const Map& map, KeyframeId root) { return selection(map, members(map, root)); }
 
+/// The map that remains after removing these keyframes.
 Map without(const Map& map, const std::set<KeyframeId>& keyframes) {
   std::set<KeyframeId> inside;
   for (const KeyframeId id : map.keyframe_ids()) {
@@ -89,6 +95,8 @@ Map without(const Map& map, const std::set<KeyframeId>& keyframes) {
   }
 
   Map result = selection(map, inside);
+
+  // Normals and descriptors change with the observers
   for (const core::PointId id : result.point_ids()) {
     const std::size_t seen = std::as_const(result).point(id).observations.size();
     if (seen != map.point(id).observations.size()) result.refresh_point(id);
@@ -98,13 +106,17 @@ Map without(const Map& map, const std::set<KeyframeId>& keyframes) {
 
 void move_component(Map& map, KeyframeId root, const geometry::Rigid3& new_from_old_world) {
   const std::set<KeyframeId> inside = members(map, root);
+
+  // A landmark belongs to its first observer's component
   const auto is_inside = [&](const auto& landmark) {
     return !landmark.observations.empty() && inside.count(landmark.observations.front().keyframe) != 0;
   };
 
+  // Poses change frame on the world's side
   const geometry::Rigid3 old_from_new_world = new_from_old_world.inverse();
   for (const KeyframeId id : inside) map.set_pose(id, map.camera_from_world(id) * old_from_new_world);
 
+  // Landmarks move with their observers
   for (const core::PointId id : map.point_ids()) {
     if (!is_inside(std::as_const(map).point(id))) continue;
     MapPoint& point = map.point(id);
@@ -113,6 +125,7 @@ void move_component(Map& map, KeyframeId root, const geometry::Rigid3& new_from_
     point.view_direction = new_from_old_world.rotation * point.view_direction;
   }
 
+  // Lines move with their observers
   for (const core::LineId id : map.line_ids()) {
     if (!is_inside(std::as_const(map).line(id))) continue;
     MapLine& line = map.line(id);
@@ -122,6 +135,7 @@ void move_component(Map& map, KeyframeId root, const geometry::Rigid3& new_from_
 }
 
 void split_component(Map& map, KeyframeId first) {
+  // Keyframes of one robot from `first` on
   const KeyframeId root = root_of(map, first);
   if (root == first) return;
   const std::set<KeyframeId> all = members(map, root);
@@ -144,17 +158,20 @@ void split_component(Map& map, KeyframeId first) {
       if (std::any_of(seen.begin(), seen.end(), is_other)) map.unobserve(point, id);
     }
 
+    // The same for lines
     for (const core::LineId line : map.lines_seen_by({id})) {
       const auto& seen = std::as_const(map).line(line).observations;
       if (std::any_of(seen.begin(), seen.end(), is_other)) map.unobserve(line, id);
     }
   }
 
+  // Loops across the split no longer hold
   const auto is_between = [&](const KeyframeEdge& e) { return is_later(e.a) != is_later(e.b); };
   std::vector<LoopEdge> loops = map.loops();
   loops.erase(std::remove_if(loops.begin(), loops.end(), is_between), loops.end());
   map.set_loops(std::move(loops));
 
+  // Constraints across it keep their number, without weight
   const std::map<std::uint64_t, SurfaceEdge> edges = map.edges();
   for (auto [number, edge] : edges) {
     if (!is_between(edge) || all.count(edge.a) == 0) continue;
@@ -169,6 +186,7 @@ std::vector<FramePose> frames_in(const Map& map, std::vector<FramePose> frames) 
   return frames;
 }
 
+/// The component in which most frames were tracked.
 KeyframeId main_root(const Map& map, const std::vector<FramePose>& frames) {
   const std::vector<KeyframeId> all = roots(map);
   if (all.size() == 1) return all.front();

@@ -18,6 +18,7 @@ bool is_between_keyframes(const FramePose& frame, const Map& map) {
   return frame.tracked && map.has_keyframe(frame.reference) && !became_keyframe(frame, map);
 }
 
+/// Tracked frames in the map's frame, through the current poses of their reference keyframes.
 geometry::Trajectory trajectory(const std::vector<FramePose>& frames, const Map& map) {
   geometry::Trajectory result;
   for (const FramePose& frame : frames) {
@@ -39,29 +40,37 @@ bool beyond_noise(double off_m, double off_rad, double sigma_m) {
 }
 
 PathCheck check_path(const std::vector<FramePose>& frames, const Map& map) {
+  // One frame before, for each robot
   PathCheck check;
   std::map<std::int32_t, const FramePose*> last;  // by robot
 
   for (const FramePose& frame : frames) {
     if (!frame.reference.valid()) continue;
+
+    // Only consecutive tracked frames are compared
     const FramePose* before = std::exchange(last[frame.reference.robot], &frame);
     if (before == nullptr || !before->tracked || !frame.tracked || !frame.camera_from_previous) continue;
+
+    // Within one reference the step cannot tear
     if (before->reference == frame.reference) continue;
 
+    // The step as optimised, against the step as tracked
     const geometry::Rigid3 step =
         frame.camera_from_reference * map.camera_from_world(frame.reference) *
         (before->camera_from_reference * map.camera_from_world(before->reference)).inverse();
     const geometry::Rigid3 off = step * frame.camera_from_previous->inverse();
     const PathStep seen{frame.stamp, before->reference, frame.reference, off.translation.norm(),
                         geometry::rotation_angle(off.rotation)};
+
+    // A deviation beyond noise is a tear
     check.largest_m = std::max(check.largest_m, seen.off_m);
     check.largest_rad = std::max(check.largest_rad, seen.off_rad);
     if (beyond_noise(seen.off_m, seen.off_rad, frame.step_sigma_m)) check.tears.push_back(seen);
   }
-
   return check;
 }
 
+/// The keyframes' path; `robot` selects those of one robot.
 geometry::Trajectory trajectory(const std::vector<KeyframePose>& keyframes,
                                 std::optional<std::int32_t> robot) {
   geometry::Trajectory result;
@@ -81,6 +90,7 @@ std::vector<KeyframePose> keyframe_poses(const Map& map) {
   return poses;
 }
 
+/// Poses and their names; untracked frames count too.
 MapPoses poses_of(const Map& map, const std::vector<FramePose>& frames) {
   MapPoses poses{trajectory(frames, map), {}, keyframe_poses(map)};
   std::map<std::int32_t, std::int32_t> numbers;  // by robot
@@ -98,6 +108,7 @@ std::map<std::int32_t, geometry::Trajectory> by_robot(const MapPoses& map) {
   return paths;
 }
 
+/// Changes the reference frame of all poses.
 void move(MapPoses& poses, const geometry::Rigid3& frame_from_map) {
   for (geometry::StampedPose& pose : poses.trajectory) {
     pose.world_from_camera = frame_from_map * pose.world_from_camera;

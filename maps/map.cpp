@@ -8,6 +8,7 @@
 namespace plumbline::maps {
 namespace {
 
+/// Removes the observation by `keyframe`; its feature, or -1.
 int take(std::vector<Observation>& observations, KeyframeId keyframe) {
   const auto found = std::find_if(observations.begin(), observations.end(),
                                   [&](const Observation& o) { return o.keyframe == keyframe; });
@@ -44,6 +45,8 @@ KeyframeId Map::add_keyframe(std::shared_ptr<const Keyframe> keyframe,
                              const geometry::Rigid3& camera_from_world) {
   if (keyframe == nullptr || !keyframe->id.valid()) throw std::invalid_argument("add_keyframe: no id");
   const KeyframeId id = keyframe->id;
+
+  // No feature observes a landmark yet
   KeyframeEntry entry;
   if (keyframe->features != nullptr) {
     entry.points.resize(keyframe->features->points.size());
@@ -52,11 +55,14 @@ KeyframeId Map::add_keyframe(std::shared_ptr<const Keyframe> keyframe,
   entry.data = std::move(keyframe);
   entry.pose = camera_from_world;
   keyframes_.insert(id, std::move(entry));
+
+  // Patches serve only the most recent keyframes
   erase_patches({id.robot, id.index - kPatchedKeyframes});
   return id;
 }
 
 void Map::replace_keyframe(std::shared_ptr<const Keyframe> keyframe) {
+  // Observations name features by their number
   KeyframeEntry& entry = keyframes_.at(keyframe->id);
   const auto counts = [](const Keyframe& k) {
     return k.features == nullptr ? std::pair<std::size_t, std::size_t>()
@@ -68,6 +74,7 @@ void Map::replace_keyframe(std::shared_ptr<const Keyframe> keyframe) {
 }
 
 void Map::erase_patches(KeyframeId id) {
+  // Features are shared with readers of older revisions
   if (!id.valid() || !keyframes_.contains(id)) return;
   std::shared_ptr<const Keyframe>& data = keyframes_.at(id).data;
   if (data->features == nullptr || data->features->patches.empty()) return;
@@ -112,11 +119,15 @@ template <typename Id>
 void Map::merge(Id kept, Id gone) {
   if (kept == gone) throw std::invalid_argument("merge: both are one landmark");
   auto& k = landmarks(kept).at(kept);
+
+  // A copy: its observations outlive the landmark
   const auto g = landmarks(gone).at(gone);
   k.visible += g.visible;
   k.found += g.found;
   remove(gone);
   for (const Observation& o : g.observations) observe(kept, o.keyframe, o.feature);
+
+  // Descriptor and direction from all observations
   if constexpr (std::is_same_v<Id, PointId>) {
     if (k.normal.isZero()) k.normal = g.normal;
     refresh_point(kept);
@@ -125,6 +136,7 @@ void Map::merge(Id kept, Id gone) {
 template void Map::merge(PointId kept, PointId gone);
 template void Map::merge(LineId kept, LineId gone);
 
+/// Adds `change` to the counts of covisible landmarks, on both sides.
 void Map::share(const std::vector<Observation>& others, KeyframeId keyframe, int change) {
   KeyframeEntry& entry = keyframes_.at(keyframe);
   for (const Observation& o : others) {
@@ -139,6 +151,7 @@ void Map::share(const std::vector<Observation>& others, KeyframeId keyframe, int
   }
 }
 
+/// One observation per landmark and keyframe, one landmark per feature.
 template <typename Id>
 bool Map::observe(Id id, KeyframeId keyframe, int feature, bool aligned) {
   std::vector<Observation>& observations = landmarks(id).at(id).observations;
@@ -152,6 +165,7 @@ bool Map::observe(Id id, KeyframeId keyframe, int feature, bool aligned) {
 template bool Map::observe(PointId id, KeyframeId keyframe, int feature, bool aligned);
 template bool Map::observe(LineId id, KeyframeId keyframe, int feature, bool aligned);
 
+/// The inverse of observe(): feature, observation and covisibility.
 template <typename Id>
 void Map::unobserve(Id id, KeyframeId keyframe) {
   std::vector<Observation>& observations = landmarks(id).at(id).observations;
@@ -183,17 +197,21 @@ std::vector<LineId> Map::lines_seen_by(const std::vector<KeyframeId>& keyframes)
       keyframes, [&](KeyframeId id) -> const auto& { return lines_of(id); });
 }
 
+/// Neighbours in the covisibility graph, strongest first.
 std::vector<std::pair<KeyframeId, int>> Map::covisible(KeyframeId keyframe, int min_shared) const {
   const auto& shared = keyframes_.at(keyframe).shared;
   std::vector<std::pair<KeyframeId, int>> result(shared.begin(), shared.end());
   std::stable_sort(result.begin(), result.end(),
                    [](const auto& a, const auto& b) { return a.second > b.second; });
+
+  // The strongest neighbour is kept even below the threshold
   if (result.empty()) return result;
   const int threshold = std::min(min_shared, result.front().second);
   while (result.back().second < threshold) result.pop_back();
   return result;
 }
 
+/// The `count` strongest neighbours above the usual threshold.
 std::vector<KeyframeId> Map::neighbours(KeyframeId keyframe, std::size_t count) const {
   std::vector<KeyframeId> result;
   if (!has_keyframe(keyframe)) return result;
@@ -210,6 +228,7 @@ int Map::shared(KeyframeId a, KeyframeId b) const {
 }
 
 void Map::add_edge(const SurfaceEdge& edge) {
+  // Both ends share the constraint's number
   if (edge.a == edge.b) throw std::invalid_argument("add_edge: both ends are one keyframe");
   KeyframeEntry& a = keyframes_.at(edge.a);  // both must be there before either is changed
   KeyframeEntry& b = keyframes_.at(edge.b);
@@ -244,6 +263,7 @@ void Map::refresh_point(PointId id) {
   MapPoint& p = points_.at(id);
   if (p.observations.empty()) return;
 
+  // Mean viewing direction of the observers
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();
   std::vector<const features::Descriptor256*> descriptors;  // by observation
   for (const Observation& o : p.observations) {
@@ -255,7 +275,6 @@ void Map::refresh_point(PointId id) {
   if (direction.norm() > 1e-9) p.view_direction = direction.normalized();
   // The descriptor with the least sum of distances to the others.
   int best_sum = -1;
-
   for (std::size_t i = 0; i < descriptors.size(); ++i) {
     const auto* candidate = descriptors[i];
     int sum = 0;

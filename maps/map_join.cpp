@@ -39,6 +39,7 @@ class PartsCollector {
     // A map that stays where it is keeps every bit.
     const bool stays = world_from_map.rotation.isIdentity(0.0) && world_from_map.translation.isZero(0.0);
 
+    // Keyframes in the common world, with new robot numbers
     for (const KeyframeId id : map.keyframe_ids()) {
       auto data = std::make_shared<Keyframe>(map.keyframe(id));
       data->id = renamed(id, to);
@@ -48,17 +49,21 @@ class PartsCollector {
            renamed(map.parent(id), to)});
     }
 
+    // Landmarks are rotated with their directions
     for (const core::PointId id : map.point_ids()) {
       MapPoint point = map.point(id);
       point.id = renamed(id, to);
       point.position = world_from_map * point.position;
       point.view_direction = world_from_map.rotation * point.view_direction;
       point.normal = world_from_map.rotation * point.normal;
+
+      // Observations refer to renamed keyframes
       point.angle_keyframe = renamed(point.angle_keyframe, to);
       point.observations = renamed(std::move(point.observations), to);
       parts_.points.push_back(std::move(point));
     }
 
+    // Line ends follow the same motion
     for (const core::LineId id : map.line_ids()) {
       MapLine line = map.line(id);
       line.id = renamed(id, to);
@@ -68,20 +73,22 @@ class PartsCollector {
       parts_.lines.push_back(std::move(line));
     }
 
+    // Edge numbers continue those of earlier maps
     const std::uint64_t first_edge = parts_.next.edge;
     for (const auto& [order, edge] : map.edges()) {
       parts_.edges.emplace_back(first_edge + order, renamed(edge, to));
     }
 
+    // Loops and next free ids are renamed alike
     for (const LoopEdge& loop : map.loops()) parts_.loops.push_back(renamed(loop, to));
     const NextIds next = map.next_ids();
     for (const KeyframeId id : next.keyframes) parts_.next.keyframes.push_back(renamed(id, to));
-
     for (const core::PointId id : next.points) parts_.next.points.push_back(renamed(id, to));
     for (const core::LineId id : next.lines) parts_.next.lines.push_back(renamed(id, to));
     parts_.next.edge = first_edge + next.edge;
   }
 
+  /// The joined map; its constructor expects every list in order of ids.
   [[nodiscard]] Map take() {
     const auto by_id = [](const auto& a, const auto& b) { return a.id < b.id; };
     std::sort(parts_.keyframes.begin(), parts_.keyframes.end(),
@@ -114,6 +121,7 @@ Map joined(const std::vector<const Map*>& maps, const std::vector<Rigid3>& world
 }
 
 std::uint64_t content_hash(const Map& map) {
+  // Ids are left out: joining changes them
   core::Hash hash;
   for (const KeyframeId id : map.keyframe_ids()) {
     const Keyframe& keyframe = map.keyframe(id);
@@ -123,19 +131,20 @@ std::uint64_t content_hash(const Map& map) {
     hash.bytes(pose.translation.data(), 3 * sizeof(double));
     if (keyframe.features == nullptr) continue;
 
+    // Keypoints and depths
     for (const features::PointFeature& f : keyframe.features->points) {
       hash.number(f.pixel.x());
       hash.number(f.pixel.y());
       hash.number(f.depth);
     }
 
+    // Appearance and lines
     for (const features::Descriptor256& d : keyframe.features->descriptors) hash.bytes(&d, sizeof d);
     for (const features::LineFeature& f : keyframe.features->lines) {
       hash.number(f.segment.start.x());
       hash.number(f.segment.end.y());
     }
   }
-
   return hash.value();
 }
 

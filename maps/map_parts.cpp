@@ -41,6 +41,7 @@ NextIds Map::next_ids() const {
 
 namespace {
 
+/// Pages with a change after the revision `since`, with all their landmarks.
 template <typename IdType, typename Landmark>
 std::vector<LandmarkPage<Landmark>> touched(const IdMap<IdType, Landmark>& all, std::uint64_t since) {
   constexpr std::int32_t kPage = IdMap<IdType, Landmark>::kIdsPerPage;
@@ -57,6 +58,7 @@ std::vector<LandmarkPage<Landmark>> touched(const IdMap<IdType, Landmark>& all, 
 
 }  // namespace
 
+/// Keyframes always, landmarks and edges since `moment`.
 MapChanges Map::changes_since(const MapRevision& moment) const {
   MapChanges changes;
   changes.whole = moment.points == 0 && moment.lines == 0 && moment.edges == 0;
@@ -85,26 +87,31 @@ void Map::restore_tree(const MapParts& parts) {
 
 Map::Map(MapParts parts) {
   try {
+    // Keyframes first: all else refers to them
     for (const MapParts::KeyframePart& part : parts.keyframes) {
       require(part.data != nullptr && part.data->id.valid() && !has_keyframe(part.data->id),
               "a keyframe's id is invalid or there twice");
       add_keyframe(part.data, part.camera_from_world);
     }
 
+    // Landmarks, then the spanning tree
     restore_landmarks(*this, points_, parts.points);
     restore_landmarks(*this, lines_, parts.lines);
     restore_tree(parts);
 
+    // Edge numbers must increase
     for (const auto& [number, edge] : parts.edges) {
       require(number >= next_edge_, "edges are out of order");
       next_edge_ = number;
       add_edge(edge);
     }
 
+    // Numbers beyond the last edge stay reserved
     require(parts.next.edge >= next_edge_, "an edge's number is too large");
     next_edge_ = parts.next.edge;
     set_loops(std::move(parts.loops));
 
+    // Ids of removed elements are not given again
     for (const KeyframeId next : parts.next.keyframes) keyframes_.reserve(next);
     for (const PointId next : parts.next.points) points_.reserve(next);
     for (const LineId next : parts.next.lines) lines_.reserve(next);

@@ -11,6 +11,7 @@ namespace {
 using geometry::Rigid3;
 using geometry::Vector6d;
 
+/// Corrects one cloud for one change of the calibration.
 void apply_one(const sensor::Recalibration& change, const Vector6d& velocity, cloud::Cloud& cloud) {
   if (!change.keeps_images()) {
     for (cloud::Point& point : cloud) {
@@ -21,6 +22,8 @@ void apply_one(const sensor::Recalibration& change, const Vector6d& velocity, cl
       if (std::isfinite(normal.x())) point.getNormalVector3fMap() = change.normal(p, normal).cast<float>();
     }
   }
+
+  // A new depth delay shifts the moment of measurement
   if (change.delay_s() != 0.0)
     cloud::set_sensor_pose(cloud,
                            cloud::sensor_pose(cloud) * geometry::exp_se3(-change.delay_s() * velocity));
@@ -35,6 +38,7 @@ void recalibrate(const sensor::Recalibration& change, const Vector6d& velocity, 
   sample.normal = (delayed.rotation * change.normal(p, sample.normal.cast<double>())).cast<float>();
 }
 
+/// Consecutive camera versions give the changes between them.
 CameraHistory::CameraHistory(const std::vector<RobotInfo>& robots) {
   for (const RobotInfo& robot : robots) {
     const sensor::Camera* before = &robot.camera;
@@ -46,6 +50,7 @@ CameraHistory::CameraHistory(const std::vector<RobotInfo>& robots) {
   }
 }
 
+/// The changes that came after this keyframe, in order.
 CameraHistory::Changes CameraHistory::of(KeyframeId keyframe) const {
   Changes changes;
   const auto robot = by_robot_.find(keyframe.robot);
@@ -56,6 +61,7 @@ CameraHistory::Changes CameraHistory::of(KeyframeId keyframe) const {
   return changes;
 }
 
+/// The changes that came after this frame, in order.
 CameraHistory::Changes CameraHistory::of(FrameId frame) const {
   Changes changes;
   const auto robot = by_robot_.find(frame.robot);

@@ -39,16 +39,19 @@ FileLock lock_marker(const fs::path& folder, bool creates) {
     return open((folder / marker).c_str(), flags | O_CLOEXEC, 0644);
   };
 
+  // The marker's name tells whether the run was complete
   int descriptor = opened(kUnfinished, O_RDWR);
   if (descriptor < 0) descriptor = opened(kFiles, O_RDWR);
   if (descriptor < 0) descriptor = opened(kUnfinished, O_RDONLY);  // a copy from a medium that is read-only
   if (descriptor < 0 && creates) descriptor = opened(kUnfinished, O_RDWR | O_CREAT);
 
+  // Another run's lock is not waited for
   FileLock lock(descriptor);
   if (descriptor >= 0 && flock(descriptor, LOCK_EX | LOCK_NB) != 0) return {};
   return lock;
 }
 
+/// Notes of an unfinished or of a complete run.
 FolderNotes read_notes(const fs::path& folder) {
   FolderNotes notes;
   for (const char* marker : {kUnfinished, kFiles}) {
@@ -63,6 +66,7 @@ FolderNotes read_notes(const fs::path& folder) {
 }
 
 core::Result<void> write_notes(int descriptor, const fs::path& folder, const FolderNotes& notes) {
+  // One note per line; comments begin with #
   std::string text;
   if (notes.replaces) text += std::string(kReplaces) + "\n";
   if (!notes.files.empty()) text += "# Files of this folder whose names its user chose\n";

@@ -11,6 +11,7 @@ std::vector<geometry::Matrix6d> FusionState::covariances_of(const std::vector<st
                                                             const std::vector<double>& stamps) const {
   std::vector<geometry::Matrix6d> result;
   for (std::size_t i = 0; i < robots.size(); ++i) {
+    // The last covariance before, else the next one
     auto after = covariances.upper_bound({robots[i], stamps[i]});
     if (after != covariances.begin() && std::prev(after)->first.first == robots[i]) --after;
     if (after == covariances.end()) return {};

@@ -32,6 +32,7 @@ bool is_part_of_result(const fs::path& file) {
   fs::path folder = real.parent_path();
   constexpr int kDepth = 3;  // OUT/robots/NAME/trajectory.txt
 
+  // The result's folder may be some levels up
   for (int i = 0; i < kDepth; ++i) {
     const bool result = fs::exists(folder / "summary.json", ec) || fs::exists(folder / "map.db", ec);
     if (result && kPartsOfAResult.count(part) > 0) return true;
@@ -41,6 +42,7 @@ bool is_part_of_result(const fs::path& file) {
   return false;
 }
 
+/// Refuses to overwrite an input, a result's part or a recording's part.
 core::Result<void> check_output(const fs::path& output, const std::vector<fs::path>& inputs) {
   const auto refused = [&](const char* why) {
     return core::usage_error(fmt::format("{}: {}; choose another name", output.string(), why));

@@ -42,6 +42,7 @@ bool is_there(const fs::path& folder) {
 
 /// Checks that nothing is at the target, or what may be replaced.
 core::Result<void> check_target(const fs::path& target, bool replace, const FolderKind& kind) {
+  // A free name needs no check
   std::error_code ec;
   if (!is_there(target)) return {};
   if (!fs::is_directory(target, ec)) {
@@ -49,6 +50,7 @@ core::Result<void> check_target(const fs::path& target, bool replace, const Fold
         fmt::format("{}: is a file; name a folder that does not exist yet", target.string()));
   }
 
+  // A foreign folder is never replaced
   if (!kind.is_earlier(target)) {
     return core::usage_error(fmt::format(
         "{}: exists, is not empty and is not an earlier result; name a folder that does not exist "
@@ -56,11 +58,13 @@ core::Result<void> check_target(const fs::path& target, bool replace, const Fold
         target.string()));
   }
 
+  // Replacing an earlier result must be demanded
   if (!replace) {
     return core::usage_error(fmt::format(
         "{}: holds an earlier result; name another folder or add --force to replace it", target.string()));
   }
 
+  // Files of the user must not be lost
   const auto foreign = core::foreign_files(target, files_of(target, kind));
   if (foreign.empty()) return {};
   return core::usage_error(
@@ -108,6 +112,7 @@ bool holds_map(const fs::path& partial) {
 /// `replace`.
 core::Result<void> clear_leftover(const fs::path& target, const fs::path& partial, bool replace,
                                   const FolderKind& kind) {
+  // A complete result awaits only its renaming
   if (!is_there(partial)) return {};
   if (!replace && is_complete(partial, kind)) {
     return core::usage_error(fmt::format(
@@ -116,12 +121,14 @@ core::Result<void> clear_leftover(const fs::path& target, const fs::path& partia
         partial.string(), target.filename().string()));
   }
 
+  // An interrupted run's map can be continued
   if (!replace && holds_map(partial)) {
     return core::usage_error(
         fmt::format("{}: holds the map of an interrupted run; --resume continues it, --force drops it",
                     partial.string()));
   }
 
+  // Files of the user must not be lost
   const auto foreign = core::foreign_files(partial, files_of(partial, kind));
   if (!foreign.empty()) {
     return core::usage_error(
@@ -216,6 +223,7 @@ core::Result<OutputFolder> OutputFolder::prepare(const fs::path& out, bool repla
 
 core::Result<OutputFolder> OutputFolder::begin(const fs::path& target, FileLock lock, bool replace,
                                                bool takes_over, const FolderKind& kind) {
+  // The run writes beside its target
   const fs::path partial = with_ending(target, ".partial");
   std::error_code ec;
   fs::create_directories(partial, ec);
@@ -224,6 +232,7 @@ core::Result<OutputFolder> OutputFolder::begin(const fs::path& target, FileLock 
                                           target.string(), ec.message()));
   }
 
+  // A taken-over folder counts as unfinished again
   if (fs::exists(partial / kFiles, ec)) fs::rename(partial / kFiles, partial / kUnfinished, ec);
   if (!lock) lock = lock_marker(partial, true);
   if (!lock) {
@@ -234,18 +243,21 @@ core::Result<OutputFolder> OutputFolder::begin(const fs::path& target, FileLock 
 
   OutputFolder folder(target, lock.release(), replace, kind);
   folder.kept_ = takes_over;  // whatever follows: what is there already is somebody's map
+
+  // A full disk is reported before the work
   const fs::space_info space = fs::space(partial, ec);
   if (!ec && space.available < kLeastFreeMb * kMegabyte) {
     return core::output_error(fmt::format("{}: only {} MB are free there; at least {} MB are needed",
                                           target.string(), space.available / kMegabyte, kLeastFreeMb));
   }
-
   return folder;
 }
 
 core::Result<bool> OutputFolder::finish(const fs::path& out, bool replace, const FolderKind& kind) {
   const fs::path target = normal(out);
   const fs::path partial = with_ending(target, ".partial");
+
+  // The renaming was done, perhaps not the tidying
   if (!is_there(partial)) {
     if (!kind.is_earlier(target)) return false;
     drop_marker(target, kind);
@@ -253,6 +265,7 @@ core::Result<bool> OutputFolder::finish(const fs::path& out, bool replace, const
     return true;
   }
 
+  // The rest of an interrupted put_in_place()
   auto lock = lock_leftover(partial, kind);
   if (!lock || !is_complete(partial, kind)) return false;  // prepare() tells why
   OutputFolder folder(target, lock->release(), replace || read_notes(partial).replaces, kind);
@@ -262,6 +275,7 @@ core::Result<bool> OutputFolder::finish(const fs::path& out, bool replace, const
 }
 
 core::Result<void> OutputFolder::expect(const core::FileNames& files) {
+  // Names beyond those of every run are noted
   FolderNotes notes = read_notes(partial_);
   for (const std::string& file : files) {
     const bool known = core::is_own_file(file, kind_->files) || fs::path(file).is_absolute();
@@ -271,6 +285,7 @@ core::Result<void> OutputFolder::expect(const core::FileNames& files) {
 }
 
 core::Result<void> OutputFolder::check_there() const {
+  // The folder still has the inode that was locked
   struct stat locked {};
   if (lock_ < 0 || fstat(lock_, &locked) != 0) return {};
   for (const char* marker : {kUnfinished, kFiles}) {
@@ -291,6 +306,7 @@ core::Error OutputFolder::explained(const core::Error& error) const {
 }
 
 core::Result<void> OutputFolder::mark_complete() {
+  // The user's own files, for a later --force
   FolderNotes notes;
   notes.replaces = replace_;
   const core::FileNames all = files_of(partial_, *kind_);
@@ -301,6 +317,7 @@ core::Result<void> OutputFolder::mark_complete() {
   }
   if (auto noted = write_notes(lock_, partial_, notes); !noted) return noted;
 
+  // The marker's name is the sign of completeness
   std::error_code ec;
   fs::rename(partial_ / kUnfinished, partial_ / kFiles, ec);
   if (!ec) return {};
@@ -315,10 +332,12 @@ core::Result<void> OutputFolder::commit() {
 }
 
 core::Result<void> OutputFolder::put_in_place() {
+  // The target may have changed during the run
   auto free = check_target(target_, replace_, *kind_);
   if (free) free = check_replaced(target_, *kind_);
   if (!free) return tl::unexpected(not_moved(free.error(), target_, partial_));
 
+  // The earlier result steps aside, marked as replaced
   std::error_code ec;
   const bool replaces = is_there(target_);
   const fs::path old = replaced_of(target_);
@@ -328,6 +347,7 @@ core::Result<void> OutputFolder::put_in_place() {
     fs::rename(target_, old, ec);
   }
 
+  // Two renames, undone if the second fails
   if (!ec) fs::rename(partial_, target_, ec);
   if (ec) {
     std::error_code ignored;
@@ -337,6 +357,7 @@ core::Result<void> OutputFolder::put_in_place() {
     return tl::unexpected(not_moved({core::ErrorKind::kOutput, why}, target_, partial_));
   }
 
+  // The result is in place; leftovers may go
   partial_.clear();
   drop_marker(target_, *kind_);
   drop_replaced(target_, *kind_);

@@ -36,6 +36,7 @@ std::string samples_header(std::size_t count) {
 
 }  // namespace
 
+/// Fixed-size records of single precision behind a NumPy header.
 core::Result<void> write_pose_samples(const std::filesystem::path& file,
                                       const std::vector<KeyframeSamples>& samples) {
   core::OutputFile out(file);
@@ -52,10 +53,13 @@ core::Result<void> write_pose_samples(const std::filesystem::path& file,
 }
 
 core::Result<std::vector<KeyframeSamples>> read_pose_samples(const std::filesystem::path& file) {
+  // The header is checked last, with the count
   std::ifstream in(file, std::ios::binary);
   std::string header(kHeader, '\0');
   in.read(header.data(), kHeader);
   std::vector<KeyframeSamples> all;
+
+  // Records until the end of the file
   for (SamplesRecord record; in.read(reinterpret_cast<char*>(&record), sizeof record);) {
     KeyframeSamples one{{record.robot, record.keyframe}, {}};
     for (std::size_t s = 0; s < one.in_camera.size(); ++s) {
@@ -63,6 +67,8 @@ core::Result<std::vector<KeyframeSamples>> read_pose_samples(const std::filesyst
     }
     all.push_back(one);
   }
+
+  // A truncated record or a wrong count
   if (in.gcount() != 0 || header != samples_header(all.size())) {
     return core::input_error(
         fmt::format("{}: is damaged, or no file of {}; map again", file.string(), kPoseSamplesFile));

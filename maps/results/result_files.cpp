@@ -8,6 +8,7 @@ namespace plumbline::maps {
 namespace {
 
 core::FileNames result_files() {
+  // Files of the whole run
   core::FileNames files{"map.ply",
                         "map.pcd",
                         "lines.ply",
@@ -30,6 +31,8 @@ core::FileNames result_files() {
                         "meetings/*/meeting.json",
                         "meetings/*/*.txt",
                         "meetings/*/map.png"};
+
+  // For each robot or each component
   for (const char* folder : {"robots/*/", "components/*/"}) {
     for (const char* file : {"map.ply", "lines.ply", "trajectory.txt", "keyframes.txt", "camera.yaml"})
       files.push_back(std::string(folder) + file);

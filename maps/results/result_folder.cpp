@@ -14,6 +14,7 @@
 
 namespace plumbline::maps {
 
+/// One folder per robot; a single robot's path is in the result itself.
 std::vector<std::filesystem::path> ResultFolder::robot_folders() const {
   std::vector<std::filesystem::path> folders;
   std::error_code ec;
@@ -26,6 +27,7 @@ std::vector<std::filesystem::path> ResultFolder::robot_folders() const {
   return folders;
 }
 
+/// The folder, or why it is no result.
 core::Result<ResultFolder> open_result(const std::filesystem::path& folder) {
   if (folder.empty()) return core::usage_error("the path of the result is empty");
   std::error_code ec;
@@ -52,15 +54,18 @@ cloud::CloudFrame frame_of_result(const ResultFolder& result) {
   return cloud::frame_with(summary->at(place) == "none" ? cloud::Up::kMinusY : cloud::Up::kZ);
 }
 
+/// The reference frame of a map cloud; a cloud without a note has that of its result folder.
 cloud::CloudFrame frame_of_cloud(const std::filesystem::path& file, const cloud::CloudFrame& said) {
   if (said.known() || file.filename().string().rfind("map", 0) != 0) return said;
 
+  // The result may be one or two folders up
   std::filesystem::path folder = std::filesystem::absolute(file).lexically_normal().parent_path();
   if (folder.filename() == "levels") folder = folder.parent_path();
   if (folder.parent_path().filename() == "components") folder = folder.parent_path().parent_path();
   return is_result_folder(folder) ? frame_of_result(ResultFolder{folder}) : said;
 }
 
+/// The fused cloud, PLY before PCD.
 core::Result<cloud::CloudFile> read_result_cloud(const ResultFolder& result) {
   std::error_code ec;
   const bool pcd = !std::filesystem::exists(result.ply(), ec) && std::filesystem::exists(result.pcd(), ec);
@@ -70,6 +75,7 @@ core::Result<cloud::CloudFile> read_result_cloud(const ResultFolder& result) {
   return file;
 }
 
+/// The segments of lines.ply.
 core::Result<std::vector<LineSegment3>> read_lines_ply(const std::filesystem::path& file) {
   const auto data = cloud::read_ply(file);
   if (!data) return tl::unexpected(data.error());
@@ -87,6 +93,7 @@ core::Result<std::vector<LineSegment3>> read_lines_ply(const std::filesystem::pa
   return lines;
 }
 
+/// The path as a chain of edges between its positions.
 core::Result<void> write_trajectory_ply(const std::filesystem::path& file,
                                         const geometry::Trajectory& trajectory) {
   std::array<std::vector<float>, 3> xyz;

@@ -36,6 +36,7 @@ std::string free_name(const std::string& name, std::set<std::string>& taken) {
 
 }  // namespace
 
+/// Reading is parallel, its order fixed.
 core::Result<std::unique_ptr<StoredMaps>> StoredMaps::open(const std::vector<fs::path>& maps,
                                                            const core::Executor& executor, PartOrder order) {
   std::unique_ptr<StoredMaps> result(new StoredMaps);
@@ -51,6 +52,7 @@ core::Result<std::unique_ptr<StoredMaps>> StoredMaps::open(const std::vector<fs:
 }
 
 core::Result<StoredPart> StoredMaps::read_part(const fs::path& map, PartOrder order) {
+  // A result folder stands for its store
   std::error_code ec;
   const fs::path file = fs::is_directory(map, ec) ? map / "map.db" : map;
   if (!fs::exists(file, ec)) {
@@ -58,12 +60,14 @@ core::Result<StoredPart> StoredMaps::read_part(const fs::path& map, PartOrder or
         fmt::format("{}: no such map; give result folders of plumbline map", file.string()));
   }
 
+  // A map without keyframes has no frame to align
   auto run = StoredRun::open(file);
   if (!run) return tl::unexpected(run.error());
   if (run->stored().map.keyframe_count() == 0) {
     return core::input_error(fmt::format("{}: the map has no keyframes; leave it out", file.string()));
   }
 
+  // The folder or the robot names a map
   StoredPart part{core::folder_name(name_of(file)), std::move(*run), {}};
   part.robots = part.run.stored().header.robots;
   if (order == PartOrder::kByContent && part.robots.size() == 1) part.robots.front().name = part.name;
@@ -71,11 +75,13 @@ core::Result<StoredPart> StoredMaps::read_part(const fs::path& map, PartOrder or
   return part;
 }
 
+/// Largest map first, so that the order of the arguments does not matter.
 void StoredMaps::sort_by_content(const core::Executor& executor) {
   std::vector<std::uint64_t> hashes(parts_.size());
   executor.parallel_for(parts_.size(),
                         [&](std::size_t p) { hashes[p] = content_hash(parts_[p].run.stored().map); });
 
+  // The content's hash breaks ties
   std::vector<std::size_t> order(parts_.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(), [&](std::size_t x, std::size_t y) {
@@ -83,6 +89,7 @@ void StoredMaps::sort_by_content(const core::Executor& executor) {
            std::make_tuple(parts_[x].run.stored().map.keyframe_count(), hashes[y], parts_[y].name);
   });
 
+  // Parts are moved, not copied
   std::vector<StoredPart> sorted;
   sorted.reserve(order.size());
   for (const std::size_t i : order) sorted.push_back(std::move(parts_[i]));
@@ -91,6 +98,7 @@ void StoredMaps::sort_by_content(const core::Executor& executor) {
 
 /// The numbers and names of robots.
 core::Result<void> StoredMaps::arrange(const core::Executor& executor) {
+  // A map fused with itself would be doubled
   std::set<std::string> files;
   for (const StoredPart& part : parts_) {
     std::error_code ec;
@@ -99,15 +107,17 @@ core::Result<void> StoredMaps::arrange(const core::Executor& executor) {
     }
   }
 
+  // New robot numbers across all parts
   std::set<std::string> part_names;
   std::set<std::string> robot_names;
   std::int32_t number = 0;
   std::vector<RobotNumbers> numbers(parts_.size());
-
   for (std::size_t p = 0; p < parts_.size(); ++p) {
     StoredPart& part = parts_[p];
     RobotNumbers& to = numbers[p];
     part.name = free_name(part.name, part_names);
+
+    // Old numbers map to new ones
     for (RobotInfo& robot : part.robots) {
       to[robot.number] = number;
       robot.number = number++;
@@ -116,6 +126,7 @@ core::Result<void> StoredMaps::arrange(const core::Executor& executor) {
       robots_.push_back(robot);
     }
 
+    // Every keyframe's robot must be known
     for (const KeyframeId id : part.run.stored().map.keyframe_ids()) {
       if (to.count(id.robot) == 0) {
         return core::input_error(fmt::format("{}: robot {} is not in its list of robots; map it again",
@@ -124,26 +135,29 @@ core::Result<void> StoredMaps::arrange(const core::Executor& executor) {
     }
   }
 
+  // Clouds cannot number more robots
   constexpr std::int32_t kMostRobots = 255;  // a cloud file has a byte for it
   if (number > kMostRobots) {
     return core::usage_error(fmt::format("{} robots are too many; {} can be fused", number, kMostRobots));
   }
 
+  // Views follow the new numbers
   std::vector<core::Result<StoredViews>> views(parts_.size());
   executor.parallel_for(parts_.size(), [&](std::size_t p) {
     parts_[p].run.renumber(numbers[p]);
     views[p] = parts_[p].run.views();
   });
 
+  // Clouds in the order of their parts
   for (std::size_t p = 0; p < parts_.size(); ++p) {
     if (!views[p]) return tl::unexpected(views[p].error());
     parts_[p].views = std::move(*views[p]);
     for (std::size_t view = 0; view < parts_[p].views.size(); ++view) clouds_.push_back({p, view});
   }
-
   return {};
 }
 
+/// Names the file that holds the damaged cloud.
 core::Error StoredMaps::damaged(KeyframeId id, FrameId frame, const core::Error& how) const {
   const auto cloud = std::find_if(clouds_.begin(), clouds_.end(), [&](const StoredCloud& c) {
     const StoredViews& views = views_of(c);
@@ -153,6 +167,7 @@ core::Error StoredMaps::damaged(KeyframeId id, FrameId frame, const core::Error&
   return core::input_error(fmt::format("{}: a cloud is damaged ({})", file, how.message)).value();
 }
 
+/// The part of this name, or with a robot of this name.
 core::Result<std::size_t> StoredMaps::find_part(const std::string& name) const {
   std::string names;
   for (std::size_t p = 0; p < parts_.size(); ++p) {

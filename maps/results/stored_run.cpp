@@ -38,6 +38,8 @@ const core::ConfigNode* fuse_stage_of(const core::ConfigNode& root) {
 
 core::Result<MapPlace> find_map(const fs::path& input) {
   if (input.empty()) return core::usage_error("the path of the map is empty");
+
+  // The path may be the store itself
   std::error_code ec;
   MapPlace place;
   if (fs::is_regular_file(input, ec) && input.extension() == ".db") {
@@ -45,6 +47,7 @@ core::Result<MapPlace> find_map(const fs::path& input) {
     return place;
   }
 
+  // An interrupted run still has its partial folder
   if (!fs::exists(input, ec)) {
     const fs::path left = OutputFolder::partial_of(input) / kStoreFile;
     if (fs::is_regular_file(left, ec)) {
@@ -53,11 +56,11 @@ core::Result<MapPlace> find_map(const fs::path& input) {
     }
   }
 
+  // A store suffices where the result is incomplete
   if (fs::is_regular_file(input / kStoreFile, ec)) place.store = input / kStoreFile;
   auto result = open_result(input);
   if (result) place.result = std::move(*result);
   if (!result && place.store.empty()) return tl::unexpected(result.error());
-
   return place;
 }
 
@@ -66,6 +69,7 @@ StoredRun::StoredRun(fs::path file, StoreReader reader, StoredMap map)
       reader_(std::make_unique<StoreReader>(std::move(reader))),
       map_(std::move(map)) {}
 
+/// Opens the store and loads its map, `robot`'s if they are not merged.
 core::Result<StoredRun> StoredRun::open(const fs::path& store, const std::string& robot) {
   auto reader = StoreReader::open(store);
   if (!reader) return tl::unexpected(reader.error());
@@ -75,6 +79,7 @@ core::Result<StoredRun> StoredRun::open(const fs::path& store, const std::string
   return StoredRun(store, std::move(*reader), std::move(*map));
 }
 
+/// As open(), but only the component with most tracked frames.
 core::Result<StoredRun> StoredRun::open_main(const fs::path& store, const std::string& robot) {
   auto run = open(store, robot);
   if (!run || roots(run->map_.map).size() < 2) return run;
@@ -84,6 +89,7 @@ core::Result<StoredRun> StoredRun::open_main(const fs::path& store, const std::s
   return run;
 }
 
+/// New robot numbers in keyframes and frames; unchanged numbers cost nothing.
 void StoredRun::renumber(const RobotNumbers& numbers) {
   numbers_ = numbers;
   const auto stays = [](const auto& number) { return number.first == number.second; };
@@ -101,6 +107,7 @@ MapPoses StoredRun::poses() const {
   return poses;
 }
 
+/// Line landmarks in the output frame.
 std::vector<LineSegment3> StoredRun::lines() const {
   std::vector<LineSegment3> segments = line_segments(map_.map);
   for (auto& [start, end] : segments) {
@@ -114,6 +121,8 @@ cloud::DenseFusionOptions StoredRun::fusion_options() const {
   cloud::DenseFusionOptions options;
   core::OptionTable table;
   options.declare(table);
+
+  // The fuse stage of the stored configuration
   const auto root = core::parse_yaml(map_.header.configuration, file_.string());
   const core::ConfigNode* stage = root ? fuse_stage_of(*root) : nullptr;
   if (stage == nullptr) return options;
@@ -124,6 +133,7 @@ cloud::DenseFusionOptions StoredRun::fusion_options() const {
   return options;
 }
 
+/// The point filters of the stored fuse stage; none if they cannot be parsed or write files.
 cloud::FilterChain StoredRun::fusion_filters() const {
   const auto root = core::parse_yaml(map_.header.configuration, file_.string());
   const core::ConfigNode* stage = root ? fuse_stage_of(*root) : nullptr;
@@ -138,6 +148,7 @@ core::Result<StoredViews> StoredRun::views() const {
   return views_of(*reader_, poses_of(map_.map, map_.frames), map_.header.robots, {}, numbers_);
 }
 
+/// The pose covariances that the run stored, if any.
 core::Result<FusionState> StoredRun::fusion_state() const {
   const auto kept = reader_->attachment(kFusionAttachment);
   if (!kept) return tl::unexpected(kept.error());
@@ -149,6 +160,7 @@ core::Result<FusionState> StoredRun::fusion_state() const {
 
 core::Result<cloud::FusedCloud> StoredRun::fused(const cloud::DenseFusionOptions& options,
                                                  const core::Executor& executor) const {
+  // Without views nothing can be fused
   const auto stored = views();
   if (!stored) return tl::unexpected(stored.error());
   if (stored->size() == 0) {
@@ -157,14 +169,16 @@ core::Result<cloud::FusedCloud> StoredRun::fused(const cloud::DenseFusionOptions
   const auto state = fusion_state();
   if (!state) return tl::unexpected(state.error());
 
+  // Poses, cameras and covariances by view
   cloud::FusionViews all;
   all.world_from_camera = stored->world_from_camera;
   for (const std::int32_t robot : stored->robots) {
     all.cameras.push_back(camera_of(map_.header.robots, robot).color);
   }
-
   all.read = [&](std::size_t i) { return stored->read(i); };
   all.covariances = state->covariances_of(stored->robots, stored->stamps);
+
+  // Filters work in the upright output frame
   auto fused = cloud::fuse_views(all, options, executor);
   if (!fused) return fused;
   if (map_.result.upright) cloud::transform(*fused->cloud, map_.result.output_from_map);
@@ -182,15 +196,21 @@ core::Result<std::size_t> StoredRun::write_keyframe_clouds(const fs::path& folde
                                      [&](std::size_t i) { return stored->read(i); });
 }
 
+/// The run's cloud file, else its views fused again.
 core::Result<cloud::CloudFile> read_map_cloud(const MapPlace& place, const core::Executor& executor) {
+  // A written cloud needs no store
   std::error_code ec;
   const bool written =
       place.result && (fs::exists(place.result->ply(), ec) || fs::exists(place.result->pcd(), ec));
   if (written || place.store.empty()) return read_result_cloud(*place.result);
+
+  // Fused with the options of the stored pipeline
   const auto stored = StoredRun::open_main(place);
   if (!stored) return tl::unexpected(stored.error());
   auto fused = stored->fused(stored->fusion_options(), executor);
   if (!fused) return tl::unexpected(fused.error());
+
+  // The same properties as in a written file
   cloud::CloudFile file;
   file.cloud = std::move(fused->cloud);
   file.columns = std::move(fused->columns);

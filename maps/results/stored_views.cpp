@@ -38,6 +38,7 @@ FrameId StoredViews::stored_frame(std::size_t view) const {
   return {stored_number(numbers, frames[view].robot), frames[view].index};
 }
 
+/// A keyframe's or a frame's cloud, corrected for later calibrations.
 core::Result<cloud::CloudPtr> StoredViews::read(std::size_t view) const {
   if (keyframes[view].valid()) {
     const core::KeyframeId id = stored_keyframe(view);
@@ -52,6 +53,7 @@ core::Result<cloud::CloudPtr> StoredViews::read(std::size_t view) const {
   return cloud;
 }
 
+/// The encoded cloud; decoded only if the calibration changed since.
 core::Result<std::vector<std::uint8_t>> StoredViews::bytes(std::size_t view) const {
   const bool of_keyframe = keyframes[view].valid();
   const bool changes =
@@ -64,6 +66,7 @@ core::Result<std::vector<std::uint8_t>> StoredViews::bytes(std::size_t view) con
   return cloud::encode_cloud(**cloud);
 }
 
+/// The surface samples of a keyframe, corrected like its cloud.
 core::Result<std::optional<StoredSurface>> StoredViews::surface(std::size_t view) const {
   if (!keyframes[view].valid()) return std::nullopt;
   const core::KeyframeId id = stored_keyframe(view);
@@ -79,6 +82,7 @@ core::Result<std::optional<StoredSurface>> StoredViews::surface(std::size_t view
 core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& map,
                                    const std::vector<RobotInfo>& robots, const Arrivals& arrivals,
                                    const RobotNumbers& numbers) {
+  // Clouds of keyframes and of frames between them
   auto keyframes = reader.cloud_ids();
   if (!keyframes) return tl::unexpected(keyframes.error());
   auto frames = reader.frame_cloud_ids();
@@ -86,20 +90,22 @@ core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& ma
   for (core::KeyframeId& id : *keyframes) id.robot = number_in(numbers, id.robot);
   for (FrameId& frame : *frames) frame.robot = number_in(numbers, frame.robot);
 
+  // Frames in the order of their arrival
   const auto arrival = [&](FrameId frame) {
     const auto found = arrivals.find(frame);
     return found == arrivals.end() ? 0 : found->second;
   };
-
   std::stable_sort(frames->begin(), frames->end(),
                    [&](FrameId a, FrameId b) { return arrival(a) < arrival(b); });
+
+  // Everything that a view needs to be read
   StoredViews views;
   views.reader = &reader;
   views.cameras = CameraHistory(robots);
   views.numbers = numbers;
 
+  // A delay's correction needs the camera's velocity
   const std::map<std::int32_t, geometry::Trajectory> paths = by_robot(map);
-
   const auto add = [&](core::KeyframeId keyframe, FrameId frame, double stamp,
                        const geometry::Rigid3& world_from_camera) {
     views.keyframes.push_back(keyframe);
@@ -107,11 +113,13 @@ core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& ma
     views.world_from_camera.push_back(world_from_camera);
     views.robots.push_back(keyframe.valid() ? keyframe.robot : frame.robot);
     views.stamps.push_back(stamp);
+
     const auto path = paths.find(views.robots.back());
     views.velocities.push_back(path == paths.end() ? geometry::Vector6d(geometry::Vector6d::Zero())
                                                    : geometry::velocity_at(path->second, stamp));
   };
 
+  // Keyframes first, in the map's order
   const std::set<core::KeyframeId> there(keyframes->begin(), keyframes->end());
   std::set<std::pair<std::int32_t, double>> seen;  // a resumed run may make a keyframe of a stored frame
   for (const KeyframePose& keyframe : map.keyframes) {
@@ -120,6 +128,7 @@ core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& ma
     seen.emplace(keyframe.id.robot, keyframe.stamp);
   }
 
+  // Frames with a pose that are not keyframes
   std::map<FrameId, std::size_t> places;
   for (std::size_t i = 0; i < map.trajectory_ids.size(); ++i) places[map.trajectory_ids[i]] = i;
   for (const FrameId frame : *frames) {
@@ -128,10 +137,10 @@ core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& ma
     const geometry::StampedPose& pose = map.trajectory[found->second];
     if (seen.count({frame.robot, pose.stamp}) == 0) add({}, frame, pose.stamp, pose.world_from_camera);
   }
-
   return views;
 }
 
+/// One PLY file per keyframe, in the output frame.
 core::Result<std::size_t> write_keyframe_clouds(
     const std::filesystem::path& folder, const StoredViews& views, const geometry::Rigid3& output_from_map,
     const cloud::CloudFrame& frame, const std::function<core::Result<cloud::CloudPtr>(std::size_t)>& read) {

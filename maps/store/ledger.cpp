@@ -20,6 +20,7 @@ void check_ledger(Database& database) {
 
 }  // namespace
 
+/// All texts; none if the file does not exist yet.
 core::Result<std::map<std::string, std::string>> Ledger::all() const {
   std::map<std::string, std::string> texts;
   std::error_code ignored;
@@ -34,6 +35,7 @@ core::Result<std::map<std::string, std::string>> Ledger::all() const {
   });
 }
 
+/// Stores the texts durably, in one transaction.
 core::Result<void> Ledger::put(const std::map<std::string, std::string>& texts) const {
   return guarded(file_, ErrorKind::kOutput, [&] {
     Database database(file_, Database::Access::kCreate);

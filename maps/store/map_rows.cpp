@@ -19,6 +19,7 @@ Page<Item> page_of(const Bytes& plain) {
   return std::make_shared<const std::vector<Item>>(decode_page<Item>(plain));
 }
 
+/// A page's landmarks; each must belong to this page.
 template <typename Landmark>
 Page<Landmark> landmarks_of(const Bytes& plain, std::int64_t robot, std::int64_t number) {
   Page<Landmark> landmarks = page_of<Landmark>(plain);
@@ -55,27 +56,33 @@ void check_frames(const std::vector<FramePose>& frames, const Map& map) {
 RowContent decode_row(const std::string& table, std::int64_t robot, std::int64_t number, const Bytes& plain,
                       const std::vector<RobotInfo>& robots) {
   if (table == "map") return decode<MapRow>(plain);
+
+  // Keyframes need the camera for their grid
   if (table == "keyframe") {
     auto keyframe = decode_keyframe(plain, camera_of(robots, static_cast<std::int32_t>(robot)).color);
     expect_own(keyframe->id.robot == robot && keyframe->id.index == number);
     return keyframe;
   }
 
+  // Poses and landmarks
   if (table == "state") return decode<KeyframeState>(plain);
   if (table == "point") return landmarks_of<MapPoint>(plain, robot, number);
   if (table == "line") return landmarks_of<MapLine>(plain, robot, number);
 
+  // Edges repeat their number
   if (table == "edge") {
     const auto row = decode<EdgeRow>(plain);
     expect_own(row.number == static_cast<std::uint64_t>(number));
     return row;
   }
 
+  // Lists in pages
   if (table == "frame") return page_of<FramePose>(plain);
   if (table == "log") return page_of<std::string>(plain);
   return {};
 }
 
+/// All rows of the store, decoded.
 MapRows MapRows::read(Database& database, const std::vector<RobotInfo>& robots) {
   MapRows all;
   for (const char* table : {"map", "keyframe", "state", "point", "line", "edge", "frame", "log"}) {
@@ -86,6 +93,7 @@ MapRows MapRows::read(Database& database, const std::vector<RobotInfo>& robots) 
   return all;
 }
 
+/// A decoded row goes to the table of its type.
 void MapRows::put(const Key& key, RowContent content) {
   struct Put {
     MapRows& rows;
@@ -103,6 +111,7 @@ void MapRows::put(const Key& key, RowContent content) {
   std::visit(Put{*this, key}, std::move(content));
 }
 
+/// Erases a row; tables without content are ignored.
 void MapRows::remove(const std::string& table, const Key& key) {
   if (table == "map") maps_.erase(key);
   if (table == "keyframe") keyframes_.erase(key);
@@ -118,6 +127,7 @@ bool MapRows::is_of(const Key& key, std::int64_t robot) const {
   return maps_.size() <= 1 || key.first == robot;
 }
 
+/// The lists of all pages of one robot, joined.
 template <typename Row>
 std::vector<Row> MapRows::gathered(const Table<Page<Row>>& pages, std::int64_t robot) const {
   std::vector<Row> all;
@@ -145,9 +155,11 @@ void MapRows::check_owners() const {
 }
 
 StoredMap MapRows::map(std::int64_t robot, const MapRow& row) const {
+  // Each keyframe has one pose and one parent
   MapParts parts;
   if (keyframes_.size() != states_.size()) throw BadBytes("a keyframe has no pose, or a pose no keyframe");
 
+  // Poses and parents are rows of their own table
   for (const auto& [key, keyframe] : keyframes_) {
     if (!is_of(key, robot)) continue;
     const auto state = states_.find(key);
@@ -155,31 +167,36 @@ StoredMap MapRows::map(std::int64_t robot, const MapRow& row) const {
     parts.keyframes.push_back({keyframe, state->second.camera_from_world, state->second.parent});
   }
 
+  // Landmarks and edges of this robot
   parts.points = gathered(points_, robot);
   parts.lines = gathered(lines_, robot);
   for (const auto& [key, edge] : edges_) {
     if (is_of(key, robot)) parts.edges.emplace_back(key.second, edge);
   }
-
   std::sort(parts.edges.begin(), parts.edges.end(),  // the table is by robot first
             [](const auto& a, const auto& b) { return a.first < b.first; });
+
+  // The next free ids and the loops
   parts.next = row.next;
   parts.loops = row.loops;
 
+  // Frames and log are beside the map
   StoredMap stored;
   stored.frames = gathered(frames_, robot);
   stored.log = gathered(log_, robot);
+
+  // Missing pages and contradictions are damage
   check_totals(row, parts, stored);
   try {
     stored.map = Map(std::move(parts));
   } catch (const std::invalid_argument& contradiction) {
     throw BadBytes(contradiction.what());
   }
-
   check_frames(stored.frames, stored.map);
   return stored;
 }
 
+/// One map per robot, or one map of all.
 std::vector<StoredMap> MapRows::maps() const {
   check_owners();
   std::vector<StoredMap> maps;
@@ -191,6 +208,7 @@ std::vector<StoredMap> MapRows::maps() const {
   return maps;
 }
 
+/// The map as of the last transaction; fails if a row was damaged.
 core::Result<StoredMap> GrowingMap::map() const {
   try {
     if (!damage.empty()) throw BadBytes(damage);
@@ -212,6 +230,7 @@ MapFollower::~MapFollower() = default;
 std::int64_t MapFollower::head() const { return map_->head; }
 core::Result<StoredMap> MapFollower::map() const { return map_->map(); }
 
+/// Applies a transaction's rows to the growing map; the first bad row ends it.
 core::Result<void> MapFollower::apply(const StoreTransaction& transaction) {
   try {
     Bytes rows = transaction.rows;

@@ -38,6 +38,7 @@ std::int64_t next_number(Database& database, StoreStream stream, std::int64_t af
   return next;
 }
 
+/// The tombstones of one transaction.
 void read_removed(Database& database, std::int64_t number, ByteWriter& to) {
   Statement rows(database,
                  "SELECT place, robot, number FROM removed WHERE changed = ? ORDER BY place, robot, number");
@@ -53,6 +54,7 @@ void read_removed(Database& database, std::int64_t number, ByteWriter& to) {
 }
 
 void read_rows(Database& database, std::size_t index, std::int64_t number, ByteWriter& to) {
+  // Rows that this transaction changed, by key
   const RowTable& table = kRowTables[index];
   const std::string key = table.named ? "key" : "robot, number";
   Statement rows(
@@ -61,6 +63,7 @@ void read_rows(Database& database, std::size_t index, std::int64_t number, ByteW
   rows.bind(1, number);
 
   while (rows.step()) {
+    // The row's key, a text or two numbers
     StoreRow row;
     row.name.table = index;
     if (table.named) {
@@ -70,6 +73,7 @@ void read_rows(Database& database, std::size_t index, std::int64_t number, ByteW
       row.name.number = rows.integer(2);
     }
 
+    // SQLite's type decides the encoding
     row.type = rows.getColumn(0).getType();
     row.data = row.type == SQLITE_BLOB ? rows.blob(0) : Bytes();
     if (row.type == SQLITE_INTEGER) row.integer = rows.integer(0);
@@ -84,6 +88,7 @@ core::Result<StoreHeads> store_heads(const std::filesystem::path& file) {
   return in_one_transaction(file, [](Database& database) { return read_heads(database); });
 }
 
+/// The transaction that follows `after`, removals first.
 core::Result<std::optional<StoreTransaction>> next_transaction(const std::filesystem::path& file,
                                                                StoreStream stream, std::int64_t after) {
   return in_one_transaction(file, [&](Database& database) -> std::optional<StoreTransaction> {

@@ -41,6 +41,7 @@ void check_id(const core::KeyframeId& id) {
   demand(!id.valid() || (id.robot <= kMostRobots && id.index < kMostNumbers), "an id is out of range");
 }
 
+/// The next free ids must be within the range of ids.
 template <typename Ids>
 void check_next(const Ids& ids) {
   constexpr std::int64_t kMost = kMostNumbers * kLandmarksPerPage;
@@ -52,6 +53,7 @@ void check_next(const Ids& ids) {
 
 void check(std::monostate /*none*/) {}
 
+/// A keyframe's numbers must be finite and within an image.
 void check(const std::shared_ptr<const Keyframe>& keyframe) {
   demand(std::isfinite(keyframe->stamp) && std::isfinite(keyframe->turn_rate), "its stamp is not finite");
   check_id(keyframe->reference);
@@ -68,6 +70,7 @@ void check(const KeyframeState& state) {
   check_id(state.parent);
 }
 
+/// Landmarks of a page are in order and finite.
 template <typename Landmark>
 void check_landmarks(const std::vector<Landmark>& landmarks) {
   std::int32_t last = -1;
@@ -88,6 +91,7 @@ void check_landmarks(const std::vector<Landmark>& landmarks) {
 void check(const Page<MapPoint>& points) { check_landmarks(*points); }
 void check(const Page<MapLine>& lines) { check_landmarks(*lines); }
 
+/// Only tracked frames have a pose.
 void check(const Page<FramePose>& frames) {
   for (const FramePose& frame : *frames) {
     demand(std::isfinite(frame.stamp), "a frame's stamp is not finite");
@@ -109,6 +113,7 @@ void check_edge(const KeyframeEdge& edge) {
 
 void check(const EdgeRow& row) { check_edge(row.edge); }
 
+/// Both cameras and all distortion terms.
 void check(const sensor::Camera& camera) {
   check(camera.color);
   if (camera.depth) check(*camera.depth);
@@ -126,6 +131,7 @@ void check(const MapRow& row) {
   for (const LoopEdge& loop : row.loops) check_edge(loop);
 }
 
+/// A refined camera's numbers must be finite and in range.
 void check(const CameraEstimate& estimate) {
   check(estimate.found);
   demand(estimate.asked_at >= -1 && estimate.used_from >= 0, "a camera's estimate is out of range");
@@ -136,11 +142,13 @@ void check(const CameraEstimate& estimate) {
 }
 
 void check_header(const std::string& key, const Bytes& bytes, std::vector<RobotInfo>& robots) {
+  // A small packet must not unpack to gigabytes
   const auto plain = [&](std::size_t most) { return unpack(bytes.data(), bytes.size(), most); };
+
+  // Robots are kept: keyframes refer to their cameras
   if (key == "robots") {
     robots = decode<std::vector<RobotInfo>>(plain(kMostSmall));
     demand(!robots.empty(), "there is no robot");
-
     for (const RobotInfo& robot : robots) {
       demand(robot.number >= 0 && robot.number <= kMostRobots, "an id is out of range");
       check(robot.camera);
@@ -177,6 +185,7 @@ void check_cloud(const Bytes& bytes) {
 
 }  // namespace
 
+/// Keys are short texts, or numbers within their table's range.
 void check_name(const RowName& name) {
   const RowTable& table = kRowTables[name.table];
   if (table.named) {
@@ -192,6 +201,7 @@ void check_name(const RowName& name) {
 }
 
 RowContent check_row(const RowName& name, const Bytes& bytes, std::vector<RobotInfo>& robots) {
+  // Rows arrive packed
   check_name(name);
   const std::string table = kRowTables[name.table].name;
   const auto plain = [&](std::size_t most) { return unpack(bytes.data(), bytes.size(), most); };

@@ -24,6 +24,7 @@ void fields(Io& io, Rigid3& transform) {
 
 namespace plumbline::sensor {
 
+/// A size beyond any camera is damage.
 template <typename Io>
 void fields(Io& io, Pinhole& p) {
   constexpr int kMost = 1 << 16;
@@ -46,6 +47,7 @@ void fields(Io& io, CameraSigma& s) {
   io(s.fx, s.centre, s.distortion, s.readout_s, s.depth_slope, s.depth_delay_s);
 }
 
+/// Model and coefficients are stored as one lens.
 template <typename Io>
 void fields(Io& io, Camera& c) {
   Lens lens = c.lens();
@@ -90,6 +92,8 @@ struct CameraEstimates {
   /// Standard deviations in the cameras' files. Older stores end before these, and so do those without any.
   std::vector<std::pair<std::int32_t, sensor::CameraSigma>> told;
 };
+
+/// Stores of earlier versions end before the standard deviations.
 template <typename Io>
 void fields(Io& io, CameraEstimates& estimates) {
   io(estimates.each);
@@ -131,6 +135,7 @@ void fields(Io& io, KeyframeState& state) {
   io(state.camera_from_world, state.parent);
 }
 
+/// One bit of the feature's number says that the observation is aligned.
 template <typename Io>
 void fields(Io& io, Observation& o) {
   constexpr std::int32_t kAligned = 1 << 30;  // beside the number of a feature

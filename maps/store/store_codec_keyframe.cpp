@@ -30,6 +30,7 @@ auto column(Io& io, Things& things) {
   };
 }
 
+/// Columns of one kind compress better than records.
 template <typename Io>
 void point_columns(Io& io, std::vector<PointFeature>& points) {
   io.column_size(points, 6 * sizeof(float));
@@ -42,6 +43,7 @@ void point_columns(Io& io, std::vector<PointFeature>& points) {
   column<std::int32_t>(io, points)([](auto& p) -> auto& { return p.octave; });
 }
 
+/// Ends in double precision, noise in single.
 template <typename Io>
 void line3_columns(Io& io, std::vector<Line3>& lines) {
   const auto exact = column<double>(io, lines);
@@ -60,6 +62,7 @@ void line3_columns(Io& io, std::vector<Line3>& lines) {
 
 template <typename Io>
 void line_columns(Io& io, std::vector<LineFeature>& lines) {
+  // Image segments
   io.column_size(lines, 5 * sizeof(float));
   const auto put = column<float>(io, lines);
   put([](auto& l) -> auto& { return l.segment.start.x(); });
@@ -67,8 +70,9 @@ void line_columns(Io& io, std::vector<LineFeature>& lines) {
   put([](auto& l) -> auto& { return l.segment.end.x(); });
   put([](auto& l) -> auto& { return l.segment.end.y(); });
   put([](auto& l) -> auto& { return l.segment.response; });
-
   for (LineFeature& l : lines) io(l.descriptor);
+
+  // Only some lines have a 3D segment
   std::vector<Line3> in_space;
   for (LineFeature& l : lines) {
     bool there = l.line3.has_value();
@@ -79,6 +83,7 @@ void line_columns(Io& io, std::vector<LineFeature>& lines) {
     if (there) in_space.push_back(*l.line3);
   }
 
+  // Segments as columns, then back to their lines
   line3_columns(io, in_space);
   if constexpr (Io::kReads) {
     auto next = in_space.begin();
@@ -88,22 +93,27 @@ void line_columns(Io& io, std::vector<LineFeature>& lines) {
   }
 }
 
+/// Single-precision image, stored as byte planes.
 template <typename Io>
 void thumbnail(Io& io, cv::Mat& image) {
+  // Only single precision is stored
   if (!image.empty() && image.type() != CV_32FC1)
     throw std::invalid_argument("store: thumbnail is no CV_32FC1");
 
+  // The size is checked before memory is allocated
   std::int32_t rows = image.rows;
   std::int32_t columns = image.cols;
   io(rows, columns);
   io.check(rows >= 0 && columns >= 0 && rows <= 1 << 14 && columns <= 1 << 14, "an image's size is wrong");
   const auto width = static_cast<std::size_t>(columns);
-  std::vector<float> values;
 
+  // Rows may have padding in memory
+  std::vector<float> values;
   if constexpr (!Io::kReads) {
     for (int y = 0; y < rows; ++y)
       values.insert(values.end(), image.ptr<float>(y), image.ptr<float>(y) + width);
     io.planes(values.data(), values.size());
+
   } else {
     const std::size_t size = static_cast<std::size_t>(rows) * width;
     io.need(size * sizeof(float));
@@ -113,6 +123,7 @@ void thumbnail(Io& io, cv::Mat& image) {
   }
 }
 
+/// Patches belong to the points; their middle is recomputed.
 template <typename Io>
 void patch_columns(Io& io, FrameFeatures& f) {
   io.column_size(f.patches, 2 * sizeof(float) + CornerPatch::kPixels);
@@ -126,6 +137,7 @@ void patch_columns(Io& io, FrameFeatures& f) {
   }
 }
 
+/// All that a keyframe keeps of its image.
 template <typename Io>
 void feature_columns(Io& io, FrameFeatures& f) {
   point_columns(io, f.points);
@@ -157,9 +169,9 @@ void keyframe_fields(Io& io, Keyframe& k, std::shared_ptr<FrameFeatures>& f) {
 /// Differences of rounded numbers of either sign, small ones as small numbers.
 template <typename Io, typename Get>
 void rounded_column(Io& io, std::vector<SurfaceSample>& samples, double step, double most, const Get& get) {
+  // Each number is a difference to its predecessor
   std::vector<std::uint32_t> codes(samples.size());
   std::uint32_t before = 0;
-
   if constexpr (!Io::kReads) {
     for (std::size_t i = 0; i < codes.size(); ++i) {
       const double value = static_cast<double>(get(samples[i]));
@@ -167,12 +179,16 @@ void rounded_column(Io& io, std::vector<SurfaceSample>& samples, double step, do
         throw std::invalid_argument("store: a surface has coordinates that are not finite");
       const auto now = static_cast<std::uint32_t>(std::lround(std::clamp(value, -most, most) / step));
       const std::uint32_t difference = now - before;
+
+      // Zigzag code: the sign in the lowest bit
       codes[i] = difference << 1U ^ (0U - (difference >> 31U));
       before = now;
     }
   }
 
   io.planes(codes.data(), codes.size());
+
+  // Sums restore the rounded values
   if constexpr (Io::kReads) {
     for (std::size_t i = 0; i < codes.size(); ++i) {
       before += (codes[i] >> 1U) ^ (0U - (codes[i] & 1U));
@@ -183,14 +199,16 @@ void rounded_column(Io& io, std::vector<SurfaceSample>& samples, double step, do
 
 template <typename Io>
 void fields(Io& io, StoredSurface& surface) {
+  // Rounding steps below the noise of depth cameras
   constexpr double kPoint_m = 2e-4;
   constexpr double kNormal = 1.0 / 250.0;
   constexpr double kSigma_m = 5e-6;
   constexpr double kMost_m = 1000.0;
+
+  // Positions, normals and noise as columns
   std::vector<SurfaceSample>& samples = surface.samples;
   io(surface.voxel_m);
   io.column_size(samples, 7 * sizeof(std::uint32_t));
-
   for (int k = 0; k < 3; ++k) {
     rounded_column(
         io, samples, kPoint_m, kMost_m, [k](auto& s) -> auto& { return s.point(k); });
@@ -203,6 +221,8 @@ void fields(Io& io, StoredSurface& surface) {
 
   rounded_column(
       io, samples, kSigma_m, 1.0, [](auto& s) -> auto& { return s.sigma; });
+
+  // Rounded normals lose their unit length
   if constexpr (Io::kReads) {
     for (SurfaceSample& sample : samples) sample.normal.normalize();
   }
@@ -215,6 +235,7 @@ void encode(const Keyframe& keyframe, ByteWriter& to) {
   keyframe_fields(to, const_cast<Keyframe&>(keyframe), features);
 }
 
+/// A keyframe; its grid is rebuilt from the points.
 std::shared_ptr<const Keyframe> decode_keyframe(const Bytes& bytes, const sensor::Pinhole& camera) {
   ByteReader from(bytes);
   auto keyframe = std::make_shared<Keyframe>();

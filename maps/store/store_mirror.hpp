@@ -66,7 +66,11 @@ class Mirror {
         {static_cast<const char*>(static_cast<const void*>(bytes.data())), bytes.size()});
     const auto [row, is_new] = rows_.try_emplace(key);
     row->second.round = round_;
+
+    // An unchanged row costs one hash
     if (!is_new && row->second.known && row->second.hash == hash) return;
+
+    // After a restart the stored bytes are compared
     const Bytes packed = pack(bytes);
     const bool is_there = !is_new && !row->second.known && holds(key, packed);
     row->second.known = true;

@@ -31,6 +31,7 @@ void read_seen(Database& database, std::vector<FramePose>& frames) {
   }
 }
 
+/// The maps of all robots, read at one moment of the store.
 std::vector<StoredMap> read_maps(Database& database, const StoreHeader& header) {
   const Transaction moment(database, false);  // one moment of a store that is being written
   std::vector<StoredMap> maps = MapRows::read(database, header.robots).maps();
@@ -69,6 +70,7 @@ StoreReader::StoreReader(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 StoreReader::StoreReader(StoreReader&& other) noexcept = default;
 StoreReader::~StoreReader() = default;
 
+/// Opens a store and checks its kind, format and header.
 core::Result<StoreReader> StoreReader::open(const std::filesystem::path& file) {
   return guarded(file, ErrorKind::kInput, [&] {
     check_file(file);
@@ -99,10 +101,13 @@ core::Result<std::vector<StoredMap>> StoreReader::load_each() const {
   return guarded(impl_->file, ErrorKind::kInput, [&] { return read_maps(*impl_->database, impl_->header); });
 }
 
+/// The map, or that of `robot` while the robots' maps are separate.
 core::Result<StoredMap> StoreReader::load(const std::string& robot) const {
   auto maps = load_each();
   if (!maps) return tl::unexpected(maps.error());
   if (maps->size() == 1) return std::move(maps->front());
+
+  // Separate maps: one must be named
   std::string names;
   for (StoredMap& map : *maps) {
     for (const RobotInfo& info : impl_->header.robots) {
@@ -116,6 +121,7 @@ core::Result<StoredMap> StoreReader::load(const std::string& robot) const {
       ") are not merged yet; name one with --robot, or continue with plumbline map --resume");
 }
 
+/// All ids of a query's two columns.
 template <typename IdType>
 core::Result<std::vector<IdType>> StoreReader::Impl::ids(const char* sql) const {
   return guarded(file, ErrorKind::kInput, [&] {
@@ -136,6 +142,7 @@ core::Result<std::vector<FrameId>> StoreReader::frame_cloud_ids() const {
   return impl_->ids<FrameId>("SELECT robot, number FROM frame_cloud ORDER BY robot, number");
 }
 
+/// A row's bytes; without `what` a missing row is empty.
 template <typename IdType>
 core::Result<std::vector<std::uint8_t>> StoreReader::Impl::blob(const char* sql, IdType id,
                                                                 const std::string& what) const {
@@ -200,12 +207,14 @@ core::Result<StoredSurface> unpack_surface(const std::vector<std::uint8_t>& byte
 
 core::Result<StoreContents> StoreReader::contents() const {
   return guarded(impl_->file, ErrorKind::kInput, [&] {
+    // All counts are of one moment
     Database& database = *impl_->database;
     const Transaction moment(database, false);
     const auto count = [&](const char* sql) { return static_cast<std::size_t>(database.number(sql)); };
     StoreContents contents;
     contents.complete = is_complete(database);
 
+    // Totals over the robots' maps
     each_row(database, "map", [&](std::int64_t, std::int64_t, const Bytes& plain) {
       const auto row = maps::decode<MapRow>(plain);
       contents.keyframes += row.keyframes;
@@ -216,6 +225,7 @@ core::Result<StoreContents> StoreReader::contents() const {
       contents.frames += row.frames;
     });
 
+    // Clouds and attachments
     contents.keyframe_clouds = count("SELECT count(*) FROM cloud");
     contents.frame_clouds = count("SELECT count(*) FROM frame_cloud");
     contents.cloud_bytes = count(
@@ -226,6 +236,7 @@ core::Result<StoreContents> StoreReader::contents() const {
   });
 }
 
+/// An attachment's bytes, if it exists.
 core::Result<std::optional<std::vector<std::uint8_t>>> StoreReader::attachment(
     const std::string& name) const {
   return guarded(impl_->file, ErrorKind::kInput, [&]() -> std::optional<std::vector<std::uint8_t>> {

@@ -112,6 +112,7 @@ struct StoreReplica::Impl {
   std::vector<Change> changes;
 };
 
+/// Received bytes by kind: clouds, poses, everything else.
 void StoreReplica::Impl::count(const RowTable& table, std::size_t size) {
   const std::string name = table.name;
   if (table.stream == StoreStream::kClouds) {
@@ -123,6 +124,7 @@ void StoreReplica::Impl::count(const RowTable& table, std::size_t size) {
   }
 }
 
+/// Writes the row as its sender stored it, under this transaction.
 void StoreReplica::Impl::put(const RowTable& table, const StoreRow& row) {
   const std::string name = table.name;
   Statement put(
@@ -143,17 +145,20 @@ void StoreReplica::Impl::put(const RowTable& table, const StoreRow& row) {
 }
 
 void StoreReplica::Impl::apply_row(const StoreRow& row) {
+  // Messages name table and key
   const RowTable& table = kRowTables[row.name.table];
   const std::string where =
       std::string(table.name) + " " +
       (table.named ? row.name.key : std::to_string(row.name.robot) + "/" + std::to_string(row.name.number));
 
+  // Refused before anything is written
   try {
     if (table.stream != stream) throw BadBytes("it belongs to the other stream");
     if (row.removed) {
       if (table.named) throw BadBytes("rows of this table stay");
       check_name(row.name);
       changes.push_back({row.name, std::nullopt});
+
     } else {
       if (row.type != type_of(table, row.name.key)) throw BadBytes("its content has the wrong type");
       changes.push_back({row.name, check_row(row.name, row.data, robots)});
@@ -162,21 +167,26 @@ void StoreReplica::Impl::apply_row(const StoreRow& row) {
   } catch (const BadBytes& bad) {
     throw BadBytes(where + ": " + bad.what());
   }
+
+  // Named rows have no tombstones
   if (table.named) return put(table, row);
 
+  // A row and its tombstone exclude each other
   const auto by_key = [&](const char* sql, const std::string& name) {
     Statement(*database, (sql + name + " AND robot = ? AND number = ?").c_str())
         .bind(1, row.name.robot)
         .bind(2, row.name.number)
         .run();
   };
-
   const std::string index = std::to_string(row.name.table);
+
+  // A row that returns loses its tombstone
   if (!row.removed) {
     by_key("DELETE FROM removed WHERE place = ", index);
     return put(table, row);
   }
 
+  // The tombstone reports the removal to other replicas
   by_key("DELETE FROM ", std::string(table.name) + " WHERE 1");
   Statement(*database, "REPLACE INTO removed VALUES (?, ?, ?, ?)")
       .bind(1, static_cast<std::int64_t>(row.name.table))
@@ -223,6 +233,7 @@ MapFollower StoreReplica::map() const { return MapFollower(impl_->map); }
 const ReplicaBytes& StoreReplica::bytes() const { return impl_->bytes; }
 void StoreReplica::roll_back() { impl_->roll_back(); }
 
+/// Transactions must arrive in order.
 core::Result<void> StoreReplica::begin(StoreStream stream, std::int64_t number) {
   impl_->roll_back();
   return impl_->guard([&] {
@@ -233,6 +244,7 @@ core::Result<void> StoreReplica::begin(StoreStream stream, std::int64_t number) 
   });
 }
 
+/// Chunks may end within a row.
 core::Result<void> StoreReplica::append(const std::uint8_t* bytes, std::size_t size) {
   return impl_->guard([&] {
     if (impl_->open == nullptr) throw BadBytes("no transaction was begun");
@@ -245,6 +257,7 @@ core::Result<void> StoreReplica::append(const std::uint8_t* bytes, std::size_t s
   });
 }
 
+/// All rows or none; counters follow the commit.
 core::Result<void> StoreReplica::commit() {
   return impl_->guard([&] {
     if (impl_->open == nullptr) throw BadBytes("no transaction was begun");
@@ -260,6 +273,7 @@ core::Result<void> StoreReplica::commit() {
   });
 }
 
+/// Empties the replica, for a sender that starts again.
 core::Result<void> StoreReplica::clear() {
   impl_->roll_back();
   return impl_->guard([&] {

@@ -21,6 +21,7 @@ void create_table(Database& database, const RowTable& table) {
   database.run("CREATE TABLE " + name + columns);
 }
 
+/// One entry of the header.
 template <typename Value>
 void put_header(Database& database, std::int64_t transaction, const char* key, const Value& value) {
   Statement(database, "REPLACE INTO header VALUES (?, ?, ?)")
@@ -44,6 +45,7 @@ std::string index_of(const std::string& table) {
   return std::to_string(std::distance(std::begin(kRowTables), found));
 }
 
+/// One table per kind of rows, with the transaction of the last change.
 void create_tables(Database& database) {
   database.run("PRAGMA application_id = " + std::to_string(kStoreApplication));
   for (const RowTable& table : kRowTables) create_table(database, table);
@@ -59,6 +61,7 @@ void create_tables(Database& database) {
   database.run("PRAGMA user_version = " + std::to_string(kStoreFormat));
 }
 
+/// The header of a new store, as its first transaction.
 void put_header(Database& database, const StoreHeader& header) {
   constexpr std::int64_t kFirst = 1;
   put_header(database, kFirst, "input", header.input);
@@ -80,6 +83,7 @@ void put_camera_versions(Database& database, std::int64_t transaction, const std
   put_header(database, transaction, "cameras", pack(encoded(versions)));
 }
 
+/// Estimates and standard deviations that differ from the defaults.
 CameraEstimates estimates_of(const std::vector<RobotInfo>& robots) {
   CameraEstimates estimates;
   for (const RobotInfo& robot : robots) {
@@ -101,6 +105,7 @@ void put_complete(Database& database, std::int64_t transaction, bool complete) {
   put_header(database, transaction, "complete", std::int64_t{complete ? 1 : 0});
 }
 
+/// The last transaction of each stream.
 StoreHeads read_heads(Database& database) {
   StoreHeads heads;
   const auto last = [&](const std::string& table, const std::string& where) {
@@ -120,17 +125,20 @@ bool is_blank(Database& database) {
 }
 
 void check_store(Database& database) {
+  // An empty file: its run was killed early
   const std::int64_t application = database.number("PRAGMA application_id");
   if (is_blank(database)) {
     throw StoreFailure(core::ErrorKind::kInput,
                        "holds nothing: the run that made it ended before it began; map the recording again");
   }
 
+  // Other programs use SQLite too
   if (application != kStoreApplication) {
     throw StoreFailure(core::ErrorKind::kInput,
                        "is an SQLite file, but not a map store; give the map.db of a result folder");
   }
 
+  // Newer formats need a newer program
   const std::int64_t format = database.number("PRAGMA user_version");
   if (format > kStoreFormat) {
     throw StoreFailure(core::ErrorKind::kInput, "is a map store of format " + std::to_string(format) +
@@ -138,6 +146,7 @@ void check_store(Database& database) {
                                                     std::to_string(kStoreFormat) + "; use a newer Plumbline");
   }
 
+  // Older formats are not converted
   if (format < 1) throw BadBytes("its format number is wrong");
   if (format < kStoreFormat) {
     throw StoreFailure(core::ErrorKind::kInput, "is a map store of format " + std::to_string(format) +
@@ -148,12 +157,14 @@ void check_store(Database& database) {
 }
 
 StoreHeader read_header(Database& database) {
+  // Texts of the run
   StoreHeader header;
   header.input = get_text(database, "input");
   header.program_version = get_text(database, "program");
   header.configuration = get_text(database, "configuration");
   header.format = static_cast<int>(database.number("PRAGMA user_version"));
 
+  // Every store has at least one robot
   Statement robots(database, "SELECT data FROM header WHERE key = 'robots'");
   if (!robots.step()) throw BadBytes("its header has no robots");
   header.robots = decode<std::vector<RobotInfo>>(robots.unpacked(0));
@@ -163,15 +174,20 @@ StoreHeader read_header(Database& database) {
     }
   };
 
+  // Cameras that were refined during the run
   Statement cameras(database, "SELECT data FROM header WHERE key = 'cameras'");
   if (cameras.step()) {
     for (const CameraVersions& of : decode<std::vector<CameraVersions>>(cameras.unpacked(0)))
       each(of.robot, [&of](RobotInfo& robot) { robot.versions = of.versions; });
   }
+
+  // Estimates and standard deviations, by robot
   Statement estimates(database, "SELECT data FROM header WHERE key = 'estimates'");
   if (estimates.step()) {
     const auto all = decode<CameraEstimates>(estimates.unpacked(0));
     for (const auto& of : all.each) each(of.first, [&of](RobotInfo& robot) { robot.estimate = of.second; });
+
+    // Standard deviations hold for all versions
     for (const auto& of : all.told) {
       each(of.first, [&of](RobotInfo& robot) {
         robot.camera.sigma = of.second;
@@ -192,6 +208,7 @@ ResultFrame read_result_frame(Database& database) {
   return statement.step() ? decode<ResultFrame>(statement.unpacked(0)) : ResultFrame();
 }
 
+/// A file that can be a store, else a reason for the user.
 void check_file(const std::filesystem::path& file) {
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored)) {

@@ -90,6 +90,7 @@ std::int64_t Database::number(const std::string& sql) {
   return statement.step() ? statement.integer(0) : 0;
 }
 
+/// True if a row was read; resets after the last and after an error.
 bool Statement::step() {
   try {
     if (executeStep()) return true;
@@ -114,6 +115,7 @@ Bytes Statement::unpacked(int column) const {
   return unpack(begin, static_cast<std::size_t>(value.getBytes()));
 }
 
+/// Calls `row` in order of robot and number; damage names its row.
 void each_row(Database& database, const std::string& table,
               const std::function<void(std::int64_t, std::int64_t, const Bytes&)>& row) {
   Statement rows(database, ("SELECT robot, number, data FROM " + table + " ORDER BY robot, number").c_str());

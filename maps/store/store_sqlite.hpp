@@ -75,11 +75,13 @@ class Transaction : public SQLite::Transaction {
 template <typename Action>
 auto guarded(const std::filesystem::path& file, core::ErrorKind kind, const Action& action)
     -> core::Result<decltype(action())> {
+  // Every message begins with the file
   const auto fail = [&](core::ErrorKind what, const std::string& text) {
     return core::failure(what, file.string() + ": " + text);
   };
 
   try {
+    // Actions may return nothing
     if constexpr (std::is_void_v<decltype(action())>) {
       action();
       return {};

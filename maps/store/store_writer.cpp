@@ -88,6 +88,7 @@ void mirror_list(std::int32_t robot, const std::vector<Thing>& things, std::size
 template <typename Thing>
 using ByRobot = std::map<std::int32_t, std::vector<Thing>>;
 
+/// The pages of a table, joined by robot.
 template <typename Thing>
 ByRobot<Thing> read_lists(Database& database, const std::string& table) {
   ByRobot<Thing> lists;
@@ -111,6 +112,7 @@ std::size_t count(const ByRobot<Thing>& lists, std::int32_t robot) {
 }  // namespace
 
 struct StoreWriter::Impl {
+  /// The mirrors know the rows of the store as it is.
   Impl(std::filesystem::path path, std::unique_ptr<Database> opened)
       : file(std::move(path)),
         database(std::move(opened)),
@@ -157,6 +159,7 @@ struct StoreWriter::Impl {
   ByRobot<std::string> log_lines;  ///< as in the file
 };
 
+/// Writes what changed of the map since the last call.
 void StoreWriter::Impl::put_map(const MapChanges& map, std::int32_t robot) {
   mirror_keyframes(map, robot);
   mirror_landmarks(map.points, map.whole, robot, points);
@@ -166,12 +169,15 @@ void StoreWriter::Impl::put_map(const MapChanges& map, std::int32_t robot) {
   recomputed = false;
 }
 
+/// Camera versions and estimates are written only if they changed.
 void StoreWriter::Impl::put_robots_of_map(const std::vector<RobotInfo>& all) {
   const auto versions = [](const std::vector<RobotInfo>& of) {
     std::size_t count = 0;
     for (const RobotInfo& robot : of) count += robot.versions.size();
     return count;
   };
+
+  // A new version changes keyframes that are stored
   recomputed = versions(all) != versions(robots);
   if (recomputed) put_camera_versions(*database, transaction, all);
   if (encoded(all) != encoded(robots)) put_robots(*database, transaction, all);
@@ -188,6 +194,7 @@ void StoreWriter::Impl::put_seen(FrameId frame, const SeenPoints& seen) {
       .run();
 }
 
+/// Poses change often, keyframes almost never.
 void StoreWriter::Impl::mirror_keyframes(const MapChanges& map, std::int32_t robot) {
   keyframes.begin_round();
   states.begin_round();
@@ -200,6 +207,7 @@ void StoreWriter::Impl::mirror_keyframes(const MapChanges& map, std::int32_t rob
   states.delete_unmarked(robot);
 }
 
+/// New edges are written, missing ones deleted.
 void StoreWriter::Impl::mirror_edges(const MapChanges& map, std::int32_t robot) {
   edges.begin_round();
   for (const auto& [number, edge] : map.edges) {
@@ -211,6 +219,7 @@ void StoreWriter::Impl::mirror_edges(const MapChanges& map, std::int32_t robot) 
   edges.delete_unmarked(robot);
 }
 
+/// Totals, next ids and loops of the map.
 void StoreWriter::Impl::put_map_row(const MapChanges& map, std::int32_t robot) {
   MapRow row;
   row.keyframes = map.keyframes.size();
@@ -231,6 +240,7 @@ void StoreWriter::Impl::erase_frames(std::int32_t robot) {
   Statement(*database, "DELETE FROM seen WHERE robot = ?").bind(1, robot).run();
 }
 
+/// A cloud, and the surface samples of a keyframe.
 void StoreWriter::Impl::put_cloud(const StoreCloud& cloud) {
   const bool of_keyframe = cloud.keyframe.valid();
   const auto put = [&](const char* sql, const Bytes& bytes) {
@@ -247,6 +257,7 @@ void StoreWriter::Impl::put_cloud(const StoreCloud& cloud) {
   put("REPLACE INTO surface VALUES (?, ?, ?, ?)", pack(encoded(*cloud.surface)));
 }
 
+/// A keyframe's image, small and whole.
 void StoreWriter::Impl::put_picture(const StorePicture& picture) {
   Statement(*database, "REPLACE INTO picture VALUES (?, ?, ?, ?)")
       .bind(1, picture.keyframe.robot)
@@ -268,6 +279,7 @@ void StoreWriter::Impl::put_extras(const StoreStep& step) {
   mirror_list(robot, list, before, log);
 }
 
+/// Writes a whole map with all frames of its robots.
 void StoreWriter::Impl::write(const Map& map, const std::vector<FramePose>& poses) {
   frame_lists.clear();
   for (const FramePose& pose : poses) frame_lists[pose.reference.robot].push_back(pose);
@@ -279,6 +291,7 @@ void StoreWriter::Impl::write(const Map& map, const std::vector<FramePose>& pose
 
 template <typename Change>
 core::Result<void> StoreWriter::Impl::transact(const Change& change) {
+  // All or nothing, as one transaction
   core::Result<void> done = guarded(file, ErrorKind::kOutput, [&] {
     ++transaction;
     Transaction whole(*database, true);
@@ -287,6 +300,7 @@ core::Result<void> StoreWriter::Impl::transact(const Change& change) {
   });
   if (done) return done;
 
+  // After a failure the mirrors must match the store
   const core::Result<void> reloaded = guarded(file, ErrorKind::kOutput, [&] {
     for (Mirror* mirror : {&maps, &keyframes, &states, &points, &lines, &edges, &frames, &log}) {
       mirror->reload();
@@ -308,14 +322,18 @@ StoreWriter::~StoreWriter() {
 
 core::Result<StoreWriter> StoreWriter::create(const std::filesystem::path& file, const StoreHeader& header,
                                               StoreUse use) {
+  // An existing store is never overwritten
   std::error_code ignored;
   if (std::filesystem::exists(file, ignored)) {
     return core::output_error(file.string() + ": exists already; remove it or write to another folder");
   }
 
+  // Header and tables in one transaction
   core::Result<StoreWriter> made = guarded(file, ErrorKind::kOutput, [&] {
     auto database = std::make_unique<Database>(file, Database::Access::kCreate);
     database->run("PRAGMA page_size = 8192");
+
+    // A growing store needs a log for its readers
     use == StoreUse::kGrowing ? use_log(*database) : use_memory(*database);
     {
       Transaction transaction(*database, true);
@@ -323,14 +341,15 @@ core::Result<StoreWriter> StoreWriter::create(const std::filesystem::path& file,
       put_header(*database, header);
       transaction.commit();
     }
-
     return StoreWriter(std::make_unique<Impl>(file, std::move(database)));
   });
 
+  // A failed start leaves no file
   if (!made) std::filesystem::remove(file, ignored);
   return made;
 }
 
+/// Opens the store of an interrupted run.
 core::Result<StoreWriter> StoreWriter::resume(const std::filesystem::path& file) {
   return guarded(file, ErrorKind::kOutput, [&] {
     check_file(file);
@@ -341,6 +360,7 @@ core::Result<StoreWriter> StoreWriter::resume(const std::filesystem::path& file)
   });
 }
 
+/// A keyframe with its cloud, and the whole map.
 core::Result<void> StoreWriter::add_keyframe(const Map& map, KeyframeId keyframe,
                                              const std::vector<std::uint8_t>& cloud,
                                              const std::vector<FramePose>& frames) {
@@ -354,8 +374,10 @@ core::Result<void> StoreWriter::add_keyframe(const Map& map, KeyframeId keyframe
 
 core::Result<void> StoreWriter::add(const StoreStep& step) {
   return impl_->transact([&] {
+    // A map made anew has new frames
     if (step.frames_anew) impl_->erase_frames(step.robot);
 
+    // New frames extend the lists of their robots
     std::map<std::int32_t, std::size_t> before;
     for (const FramePose& pose : step.frames) {
       std::vector<FramePose>& list = impl_->frame_lists[pose.reference.robot];
@@ -365,10 +387,12 @@ core::Result<void> StoreWriter::add(const StoreStep& step) {
       list.push_back(pose);
     }
 
+    // Only the pages from the old end on
     for (const auto& [robot, size] : before) {
       mirror_list(robot, impl_->frame_lists[robot], size, impl_->frames);
     }
 
+    // Clouds and images with the map that names them
     impl_->put_extras(step);
     if (step.robots != nullptr) impl_->put_robots_of_map(*step.robots);
     impl_->put_map(*step.map, step.robot);
@@ -380,6 +404,7 @@ core::Result<void> StoreWriter::add_cloud(const StoreCloud& cloud) {
   return impl_->transact([&] { impl_->put_cloud(cloud); });
 }
 
+/// Stores named bytes, replacing those of that name.
 core::Result<void> StoreWriter::attach(const std::string& name, const std::vector<std::uint8_t>& bytes) {
   return impl_->transact([&] {
     const Bytes packed = pack(bytes);

@@ -24,9 +24,11 @@ std::vector<std::uint32_t> core_points(const Surface& surface, double spacing_m)
     }
   };
 
+  // Every point with its cell and the direction it faces
   std::vector<Candidate> all;
   all.reserve(surface.points.size());
   for (std::uint32_t i = 0; i < surface.points.size(); ++i) {
+    // Among the points of a cell the one nearest to its centre comes first
     const Eigen::Vector3d at = surface.points[i].cast<double>() / spacing_m;
     const Eigen::Vector3i cell = cloud::cell_of(at);
     const double off = (at - cell.cast<double>()).array().operator-(0.5).matrix().squaredNorm();
@@ -35,6 +37,7 @@ std::vector<std::uint32_t> core_points(const Surface& surface, double spacing_m)
   }
   std::sort(all.begin(), all.end());
 
+  // One point per cell and direction
   std::vector<Eigen::Vector3f> points;
   std::vector<std::uint32_t> candidates;
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -48,6 +51,7 @@ std::vector<std::uint32_t> core_points(const Surface& surface, double spacing_m)
   PointSearch::Found found;
   std::vector<std::uint8_t> kept(candidates.size(), 0);
   std::vector<std::uint32_t> chosen;
+
   for (std::uint32_t k = 0; k < candidates.size(); ++k) {
     search.within(points[k], 0.5 * spacing_m, found);
     const bool near = std::any_of(found.begin(), found.end(), [&](const auto& f) {
@@ -67,20 +71,19 @@ struct Cores {
   std::vector<Distance> distances;
 };
 
-/// Core points of the earlier or the later surface, with distances that know nothing of the registration.
-Cores measured_cores(const Surface& of, const Surface& before, const Surface& after,
-                     const ChangeOptions& options, const core::Executor& executor) {
+/// Core points of the earlier or the later surface, with distances that leave out the registration's error.
+Cores measured_cores(const Surface& of, const SurfacePair& surfaces, const ChangeOptions& options,
+                     const core::Executor& executor) {
   Cores cores;
   for (const std::uint32_t i : core_points(of, options.spacing_m)) {
     cores.points.push_back(of.points[i]);
     cores.normals.push_back(of.normals[i]);
   }
-  cores.distances = distances(cores.points, cores.normals, before, after, 0.0, options.distance, executor);
+  cores.distances = distances(cores.points, cores.normals, surfaces, 0.0, options.distance, executor);
   return cores;
 }
 
-/// Decides on places of one surface that the other lacks: changed where its cameras looked through
-/// them.
+/// Classifies places of one surface that the other lacks: changed if the other's cameras saw through them.
 void judge_lone(std::vector<Place>& places, std::size_t first, PlaceKind changed, PlaceKind unseen,
                 const LookedThrough& through) {
   std::vector<Eigen::Vector3f> asked;
@@ -88,12 +91,16 @@ void judge_lone(std::vector<Place>& places, std::size_t first, PlaceKind changed
   for (std::size_t i = first; i < places.size(); ++i) {
     if (places[i].distance.known()) continue;
     places[i].kind = unseen;
+
+    // Points of both near by, though too few for a distance
     const Distance& d = places[i].distance;
     if (d.before.count > 0 && d.after.count > 0) continue;  // the edge of a surface
     asked.push_back(places[i].at);
     which.push_back(i);
   }
   if (!through) return;
+
+  // Cameras that saw free space there make it a change
   const std::vector<std::uint8_t> seen = through(asked);
   for (std::size_t k = 0; k < which.size(); ++k) {
     if (seen[k] != 0) places[which[k]].kind = changed;
@@ -115,12 +122,14 @@ void add_piece(const std::vector<Place>& places, const Piece& piece, const Chang
   change.area_m2 += static_cast<double>(piece.size()) * options.spacing_m * options.spacing_m;
 }
 
+/// A surface that has moved along its normal by more than the limit of detection.
 Change shifted_change(const std::vector<Place>& places, const Piece& piece, const ChangeOptions& options) {
   Change change;
   change.kind = ChangeKind::kShifted;
   add_piece(places, piece, options, change.before, change);
   std::vector<float> ways, limits;
 
+  // The median shift withstands single outliers
   Eigen::Vector3f normal(0, 0, 0);
   for (const std::uint32_t i : piece) {
     ways.push_back(places[i].distance.shift_m);
@@ -128,10 +137,13 @@ Change shifted_change(const std::vector<Place>& places, const Piece& piece, cons
     normal += places[i].normal;
   }
 
+  // The limit of detection is the 95 % bound of a normal error
   change.shift_m = median_of(std::move(ways));
   change.limit_m = median_of(std::move(limits));
   change.sigma_m = change.limit_m / 1.96;
   change.normal = normal.normalized().cast<double>();
+
+  // The surface keeps its shape and moves along its mean normal
   change.after_from_before.translation = change.shift_m * change.normal;
   change.after = change.before;
   change.after.translate(change.after_from_before.translation);
@@ -158,6 +170,7 @@ class Listing {
     add_piece(places_, piece, options_, kind == ChangeKind::kVanished ? change.before : change.after, change);
     add(std::move(change), {&piece});
   }
+  /// One change for all pieces of an object, in both maps.
   void add_move(const Move& move, const std::vector<Piece>& vanished, const std::vector<Piece>& appeared) {
     Change change;
     change.kind = ChangeKind::kMoved;
@@ -176,6 +189,7 @@ class Listing {
     add(std::move(change), pieces);
   }
 
+  /// Sorted by area, the largest first; each place gets the number of its change.
   std::vector<Change> finish() {
     std::stable_sort(changes_.begin(), changes_.end(),
                      [](const auto& a, const auto& b) { return a.first.area_m2 > b.first.area_m2; });
@@ -196,14 +210,16 @@ class Listing {
   std::vector<std::pair<Change, std::vector<const Piece*>>> changes_;
 };
 
-std::vector<Change> list_changes(std::vector<Place>& places, const Surface& before, const Surface& after,
+/// All changes of the two maps: moved objects first, for their pieces must not be listed as lone ones too.
+std::vector<Change> list_changes(std::vector<Place>& places, const SurfacePair& surfaces,
                                  const Eigen::Vector3d& up, double registration_m,
                                  const ChangeOptions& options, const core::Executor& executor) {
   const std::vector<Piece> vanished = pieces_of(places, PlaceKind::kVanished, options);
   const std::vector<Piece> appeared = pieces_of(places, PlaceKind::kAppeared, options);
   const std::vector<Piece> shifted = pieces_of(places, PlaceKind::kShifted, options);
-  const std::vector<Move> moves = find_moves(places, vanished, appeared, before, after, up, executor);
+  const std::vector<Move> moves = find_moves(places, vanished, appeared, surfaces, up, executor);
 
+  // Pieces that a motion explains
   Listing listing(places, options, registration_m);
   std::vector<std::uint8_t> moved_v(vanished.size(), 0), moved_a(appeared.size(), 0);
   for (const Move& move : moves) {
@@ -212,6 +228,7 @@ std::vector<Change> list_changes(std::vector<Place>& places, const Surface& befo
     for (const std::size_t k : move.appeared) moved_a[k] = 1;
   }
 
+  // All other pieces have only vanished or appeared
   for (std::size_t k = 0; k < vanished.size(); ++k) {
     if (moved_v[k] == 0) listing.add_lone(ChangeKind::kVanished, vanished[k]);
   }
@@ -247,19 +264,20 @@ const char* name_of(ChangeKind kind) {
   return kNames[static_cast<std::size_t>(kind)];
 }
 
-Comparison find_changes(const Surface& before, const Surface& after, const LookedThrough& through_before,
+Comparison find_changes(const SurfacePair& surfaces, const LookedThrough& through_before,
                         const LookedThrough& through_after, const Eigen::Vector3d& up,
                         const ChangeOptions& options, const core::Executor& executor) {
   Comparison result;
-  const Cores of_before = measured_cores(before, before, after, options, executor);
-  const Cores of_after = measured_cores(after, before, after, options, executor);
+  const Cores of_before = measured_cores(surfaces.before, surfaces, options, executor);
+  const Cores of_after = measured_cores(surfaces.after, surfaces, options, executor);
   result.registration_m = registration_sigma(of_before.points, of_before.normals, of_before.distances);
 
-  // Places of the earlier surface, then those of the later one that the earlier lacks.
+  // The limit of detection of a place needs the registration's error, which is known only now.
   std::vector<float> limits;
-
   for (std::size_t i = 0; i < of_before.points.size(); ++i) {
     Place place{of_before.points[i], of_before.normals[i], PlaceKind::kSame, false, of_before.distances[i]};
+
+    // A shift within the limit may be noise
     Distance& d = place.distance;
     if (d.known()) {
       d.limit_m = static_cast<float>(detection_limit(d.before, d.after, result.registration_m));
@@ -272,6 +290,7 @@ Comparison find_changes(const Surface& before, const Surface& after, const Looke
   result.median_limit_m = median_of(std::move(limits));
   judge_lone(result.places, 0, PlaceKind::kVanished, PlaceKind::kNotSeenAfter, through_after);
 
+  // Later surface: only places that the earlier one lacks
   const std::size_t first = result.places.size();
   for (std::size_t i = 0; i < of_after.points.size(); ++i) {
     if (of_after.distances[i].known()) continue;
@@ -280,6 +299,7 @@ Comparison find_changes(const Surface& before, const Surface& after, const Looke
   }
   judge_lone(result.places, first, PlaceKind::kAppeared, PlaceKind::kNotSeenBefore, through_before);
 
+  // Share of the surface seen by both maps that agrees
   constexpr float kNear_m = 0.03F;
   double near = 0.0;
   for (const Place& place : result.places) {
@@ -293,7 +313,7 @@ Comparison find_changes(const Surface& before, const Surface& after, const Looke
   const double both = count(PlaceKind::kSame) + count(PlaceKind::kShifted) + count(PlaceKind::kVanished) +
                       count(PlaceKind::kAppeared);
   result.agreement = near / std::max(1.0, both);
-  result.changes = list_changes(result.places, before, after, up, result.registration_m, options, executor);
+  result.changes = list_changes(result.places, surfaces, up, result.registration_m, options, executor);
   return result;
 }
 

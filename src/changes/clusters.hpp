@@ -26,7 +26,7 @@ struct Move {
 /// Pieces that are the same thing before and after: turned about `up` and shifted, the surface of the one
 /// lies on the other day's, and the other way round.
 std::vector<Move> find_moves(const std::vector<Place>& places, const std::vector<Piece>& vanished,
-                             const std::vector<Piece>& appeared, const Surface& before, const Surface& after,
+                             const std::vector<Piece>& appeared, const SurfacePair& surfaces,
                              const Eigen::Vector3d& up, const core::Executor& executor);
 
 }  // namespace plumbline::changes

@@ -78,6 +78,7 @@ Rigid3 settled(const Surface& before, const Surface& after, const core::Executor
   return fit.found ? fit.reference_from_cloud : Rigid3();
 }
 
+/// Moves a cloud's points and normals by `motion`, which is given in coordinates less `shift`.
 void move(viewer::Points& points, const Rigid3& motion, const Eigen::Vector3d& shift) {
   const Eigen::Vector3d own = Eigen::Vector3d(points.shift[0], points.shift[1], points.shift[2]) - shift;
   for (auto& p : points.positions) {
@@ -97,6 +98,7 @@ bool stamps_disagree(const std::optional<SeenSpace>& before, const std::optional
          before->first_stamp_s() > after->last_stamp_s();
 }
 
+/// Refuses maps of different places, or maps that are not aligned well enough to be compared.
 core::Result<void> check_fit(const Comparison& comparison, const CompareRequest& request) {
   constexpr double kLeastAgreement = 0.5;
   constexpr std::size_t kFewest = 100;
@@ -114,6 +116,7 @@ core::Result<void> check_fit(const Comparison& comparison, const CompareRequest&
                               1000.0 * comparison.registration_m)});
 }
 
+/// The summary that the terminal shows, with the largest changes only.
 std::string terminal_text(const Comparison& comparison, const std::string& placing) {
   constexpr std::size_t kMost = 20;
   std::string text = placing + ".\n";
@@ -123,11 +126,13 @@ std::string terminal_text(const Comparison& comparison, const std::string& placi
       count(PlaceKind::kSame), count(PlaceKind::kShifted), count(PlaceKind::kAppeared),
       count(PlaceKind::kVanished), count(PlaceKind::kNotSeenBefore), count(PlaceKind::kNotSeenAfter));
 
+  // Accuracy of the comparison
   text +=
       fmt::format("limit      {:.1f} mm in the median (95 %), {:.1f} mm of it how the maps lie (1 sigma)\n",
                   1000.0 * comparison.median_limit_m, 1000.0 * comparison.registration_m);
   text += fmt::format("changes    {}\n", comparison.changes.size());
 
+  // The largest changes, which come first
   for (std::size_t i = 0; i < std::min(kMost, comparison.changes.size()); ++i) {
     const Eigen::Vector3d at = comparison.changes[i].box().center();
     text += fmt::format("  {:<3} {} at {:.2f} {:.2f} {:.2f}\n", i + 1, text_of(comparison.changes[i]), at.x(),
@@ -145,6 +150,7 @@ struct Pair {
   Shown shown;
 };
 
+/// Reads both maps, aligns the later with the earlier and finds the free space of each.
 core::Result<Pair> lay_together(const CompareRequest& request, const core::Executor& executor, core::Log& log,
                                 const exports::ExportProgress& progress) {
   exports::ExportRequest first;
@@ -159,10 +165,14 @@ core::Result<Pair> lay_together(const CompareRequest& request, const core::Execu
   Pair pair;
   pair.view = std::move(*view);
   viewer::Scene& scene = pair.view.scene;
+
+  // Single precision needs coordinates near the origin
   Shown& shown = pair.shown;
   shown.shift = {scene.clouds[0].shift[0], scene.clouds[0].shift[1], scene.clouds[0].shift[2]};
   pair.before = surface_of(scene.clouds[0], shown.shift, executor);
   pair.after = surface_of(scene.clouds[1], shown.shift, executor);
+
+  // ICP refines the alignment of the second cloud
   const Rigid3 finer = settled(pair.before, pair.after, executor);
   move(scene.clouds[1], finer, shown.shift);
   pair.after = surface_of(scene.clouds[1], shown.shift, executor);
@@ -177,6 +187,7 @@ core::Result<Pair> lay_together(const CompareRequest& request, const core::Execu
   if (!space) return tl::unexpected<core::Error>(space.error());
   pair.space_after = std::move(*space);
 
+  // Facts that the tables and pages show
   shown.before = scene.clouds[0].name;
   shown.after = scene.clouds[1].name;
   shown.placing = scene.placing;
@@ -202,26 +213,30 @@ core::Result<CompareSummary> compare_maps(const CompareRequest& request, const c
   auto pair = lay_together(request, executor, log, progress);
   if (!pair) return tl::unexpected<core::Error>(pair.error());
 
+  // Stamps decide which map is the earlier one
   CompareSummary summary;
-
   if (request.order == Order::kStamps && stamps_disagree(pair->space_before, pair->space_after)) {
     CompareRequest turned = request;
     std::swap(turned.before, turned.after);
     log.info(
         fmt::format("{} was recorded before {}: it is taken as the earlier map; --order given keeps yours",
                     request.after.string(), request.before.string()));
+
+    // The earlier map gives the frame, so both are read again
     pair = lay_together(turned, executor, log, progress);
     if (!pair) return tl::unexpected<core::Error>(pair.error());
     pair->shown.swapped = summary.swapped = true;
   }
 
+  // Maps that do not fit have no changes to list
   summary.placing = pair->shown.placing;
   summary.comparison =
-      find_changes(pair->before, pair->after, function_of(pair->space_before, executor),
+      find_changes({pair->before, pair->after}, function_of(pair->space_before, executor),
                    function_of(pair->space_after, executor), pair->shown.up, request.options, executor);
   if (auto fits = check_fit(summary.comparison, request); !fits)
     return tl::unexpected<core::Error>(fits.error());
 
+  // Appeared and vanished need a record of free space
   for (const auto* known : {&pair->shown.free_space_before, &pair->shown.free_space_after}) {
     if (!*known)
       log.info(fmt::format(
@@ -230,6 +245,7 @@ core::Result<CompareSummary> compare_maps(const CompareRequest& request, const c
           known == &pair->shown.free_space_before ? "appeared" : "vanished"));
   }
 
+  // The folder appears only when it is complete
   auto written = write_tables(folder->path(), summary.comparison, pair->shown);
   if (written) written = write_pictures(folder->path(), summary.comparison, pair->shown, executor);
   if (written)

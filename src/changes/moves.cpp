@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What went here and came there.
+// Objects that have vanished at one place and appeared at another.
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -15,8 +15,8 @@ namespace {
 
 using geometry::Rigid3;
 
-constexpr double kReach_m = 0.02;      // of points that lie on a surface
-constexpr double kExplained = 0.7;     // share of a thing's places that must
+constexpr double kReach_m = 0.02;      // points this near to a surface are on it
+constexpr double kExplained = 0.7;     // least share of its places on a surface
 constexpr std::size_t kTargets = 12;   // pieces that it may have become, largest first
 constexpr std::size_t kSamples = 150;  // places of a thing that are tried
 
@@ -24,6 +24,7 @@ struct Samples {
   std::vector<Eigen::Vector3f> points, normals;
 };
 
+/// At most `most` places of a piece, evenly taken.
 Samples samples_of(const std::vector<Place>& places, const Piece& piece, std::size_t most) {
   const std::size_t step = std::max<std::size_t>(1, (piece.size() + most - 1) / most);
   Samples samples;
@@ -63,7 +64,7 @@ struct Ground {
   }
 };
 
-/// A thing laid on the ground, and how well it lies there.
+/// An object placed on the ground, and the quality of its fit.
 struct Fit {
   Rigid3 motion;  ///< ground from thing
   double turn = 0.0;
@@ -72,12 +73,14 @@ struct Fit {
   double rms_m = 0.0;
 };
 
+/// Measures how much of the object has a surface below it at the fitted pose, and how much of that is new.
 void judge(const Samples& thing, const Ground& ground, Fit& fit) {
   constexpr double kChanged_m = 0.04;
   PointSearch::Found found;
   const Eigen::Matrix3f turn = fit.motion.rotation.cast<float>();
   double hits = 0.0, changed = 0.0, squares = 0.0;
 
+  // Places with a surface near by that faces the same way
   for (std::size_t i = 0; i < thing.points.size(); ++i) {
     const Eigen::Vector3f p = (fit.motion * thing.points[i].cast<double>()).cast<float>();
     const auto hit = ground.at(p, turn * thing.normals[i], kReach_m, found);
@@ -85,10 +88,13 @@ void judge(const Samples& thing, const Ground& ground, Fit& fit) {
     const double off = static_cast<double>((p - hit->point).dot(hit->normal));
     hits += 1.0;
     squares += off * off;
+
+    // The surface is new where a changed place is near
     ground.changed.nearest(p, 1, found);
     if (!found.empty() && static_cast<double>(found.front().second) < kChanged_m * kChanged_m) changed += 1.0;
   }
 
+  // Shares of all places of the object
   const double all = std::max<double>(1.0, static_cast<double>(thing.points.size()));
   fit.share = hits / all;
   fit.changed = changed / all;
@@ -102,6 +108,7 @@ void settle(const Samples& thing, const Ground& ground, const Eigen::Vector3d& u
   PointSearch::Found found;
   double reach_m = 0.12;
 
+  // Gauss-Newton with a reach that shrinks as the fit gets better
   for (int round = 0; round < rounds; ++round, reach_m = std::max(0.03, 0.75 * reach_m)) {
     const Eigen::Vector3d middle = fit.motion * middle_of(thing);
     Eigen::Matrix4d h = 1e-9 * Eigen::Matrix4d::Identity();
@@ -114,6 +121,7 @@ void settle(const Samples& thing, const Ground& ground, const Eigen::Vector3d& u
                     reach_m, found);
       if (!hit) continue;
 
+      // Point-to-plane with a small point-to-point weight
       const Eigen::Vector3d n = hit->normal.cast<double>();
       const Eigen::Matrix3d weight = n * n.transpose() + kAlong * kAlong * Eigen::Matrix3d::Identity();
       Eigen::Matrix<double, 3, 4> j;
@@ -123,6 +131,7 @@ void settle(const Samples& thing, const Ground& ground, const Eigen::Vector3d& u
       g += j.transpose() * weight * (hit->point.cast<double>() - p);
     }
 
+    // The turn is about the object's middle
     const Eigen::Vector4d step = h.ldlt().solve(g);
     const Eigen::AngleAxisd turn(step[3], up);
     const Rigid3 about{turn.toRotationMatrix(), middle + step.head<3>() - turn.toRotationMatrix() * middle};
@@ -150,11 +159,14 @@ Fit best_place(const Samples& thing, const Ground& ground, const std::vector<Eig
   constexpr double kStep_m = 0.1;
   constexpr int kSteps = 6;  // each way
   constexpr std::size_t kSettled = 12;
-  std::vector<Fit> fits;
 
+  // Starts at each target, in all directions
+  std::vector<Fit> fits;
   for (const Eigen::Vector3d& target : targets) {
     for (int t = -kTurns + 1; t <= kTurns; ++t) fits.push_back(start(thing, target, M_PI / kTurns * t, up));
   }
+
+  // Starts on a grid about the object's old place, without a turn
   const Eigen::Vector3d x = up.unitOrthogonal(), y = up.cross(x), middle = middle_of(thing);
   for (int a = -kSteps; a <= kSteps; ++a) {
     for (int b = -kSteps; b <= kSteps; ++b) {
@@ -191,10 +203,12 @@ bool has_shape(const std::vector<Eigen::Vector3f>& normals) {
   return values[1] > 0.06 * values.sum();
 }
 
-/// Share of a thing's surroundings, along its faces, where the ground goes on: a piece of a wall is no thing.
+/// Share of an object's surroundings, along its faces, where the surface continues: a part of a wall does.
 double goes_on(const Samples& thing, const Ground& ground, const Rigid3& motion) {
   const PointSearch search(thing.points);
   PointSearch::Found found;
+
+  // Spacing of the object's own places
   std::vector<float> apart;
   for (const Eigen::Vector3f& p : thing.points) {
     search.nearest(p, 2, found);
@@ -205,6 +219,7 @@ double goes_on(const Samples& thing, const Ground& ground, const Rigid3& motion)
 
   double outside = 0.0, ground_there = 0.0;
 
+  // Points next to its rim, on all four sides in the plane
   for (std::size_t i = 0; i < thing.points.size(); ++i) {
     const Eigen::Vector3f n = thing.normals[i], u = n.unitOrthogonal(), v = n.cross(u);
 
@@ -224,13 +239,13 @@ double goes_on(const Samples& thing, const Ground& ground, const Rigid3& motion)
 class Moves {
  public:
   Moves(const std::vector<Place>& places, const std::vector<Piece>& vanished,
-        const std::vector<Piece>& appeared, const Surface& before, const Surface& after,
-        const Eigen::Vector3d& up)
+        const std::vector<Piece>& appeared, const SurfacePair& surfaces, const Eigen::Vector3d& up)
       : up_(up),
         gone_(lone(places, false)),
         come_(lone(places, true)),
-        before_{before, PointSearch(before.points), PointSearch(gone_)},
-        after_{after, PointSearch(after.points), PointSearch(come_)} {
+        before_{surfaces.before, PointSearch(surfaces.before.points), PointSearch(gone_)},
+        after_{surfaces.after, PointSearch(surfaces.after.points), PointSearch(come_)} {
+    // Every piece is tried with a limited number of its places
     for (const Piece& piece : vanished) vanished_.push_back(samples_of(places, piece, kSamples));
     for (const Piece& piece : appeared) appeared_.push_back(samples_of(places, piece, kSamples));
   }
@@ -248,6 +263,7 @@ class Moves {
   [[nodiscard]] std::optional<Move> confirm(const Fit& fit, bool vanished,
                                             const std::vector<std::uint8_t>& used_v,
                                             const std::vector<std::uint8_t>& used_a) const {
+    // The motion from the earlier to the later map
     Move move;
     move.after_from_before = vanished ? fit.motion : fit.motion.inverse();
     move.turn_rad = std::remainder(vanished ? fit.turn : -fit.turn, 2.0 * M_PI);
@@ -255,6 +271,7 @@ class Moves {
     std::vector<Eigen::Vector3f> normals;
     double all = 0.0, changed = 0.0;
 
+    // A piece belongs to the object if most of it fits under the same motion
     const auto take = [&](const std::vector<Samples>& pieces, const std::vector<std::uint8_t>& used,
                           const Ground& ground, const Rigid3& motion, std::vector<std::size_t>& taken) {
       for (std::size_t k = 0; k < pieces.size(); ++k) {
@@ -274,6 +291,7 @@ class Moves {
     take(vanished_, used_v, after_, move.after_from_before, move.vanished);
     take(appeared_, used_a, before_, move.after_from_before.inverse(), move.appeared);
 
+    // A single plane fits any wall, so it needs changed surface and an edge
     constexpr double kMostlyChanged = 0.5;
     const bool both = !move.vanished.empty() && !move.appeared.empty();
     const bool certain = all > 0.0 && changed / all >= kMostlyChanged;
@@ -307,16 +325,18 @@ class Moves {
 }  // namespace
 
 std::vector<Move> find_moves(const std::vector<Place>& places, const std::vector<Piece>& vanished,
-                             const std::vector<Piece>& appeared, const Surface& before, const Surface& after,
+                             const std::vector<Piece>& appeared, const SurfacePair& surfaces,
                              const Eigen::Vector3d& up, const core::Executor& executor) {
   constexpr std::size_t kMost = 60;  // pieces that are tried, largest first
-  const Moves moves(places, vanished, appeared, before, after, up);
+  const Moves moves(places, vanished, appeared, surfaces, up);
 
   struct Try {
     std::size_t piece;
     bool vanished;
     Fit fit = {};
   };
+
+  // The best pose of every large piece by itself
   std::vector<Try> tries;
   for (std::size_t k = 0; k < std::min(kMost, vanished.size()); ++k) tries.push_back({k, true});
   for (std::size_t k = 0; k < std::min(kMost, appeared.size()); ++k) tries.push_back({k, false});

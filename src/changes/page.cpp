@@ -28,6 +28,7 @@ constexpr const char* kPageScript =
     "v.camera.look('orbit');v.camera.target=[x-o[0],y-o[1],z-o[2]];v.camera.distance=d;v.camera.pitch=-0.6;"
     "v.setLayer('change');v.changed();}));\n";
 
+/// Text with the characters escaped that HTML gives a meaning.
 std::string markup(const std::string& text) {
   std::string out;
   for (const char c : core::printable(text)) {
@@ -48,6 +49,8 @@ void add_layers(viewer::Points& points, const Comparison& comparison, const Show
                 const core::Executor& executor) {
   constexpr float kReach2 = 0.06F * 0.06F;
   constexpr std::size_t kBlock = 4096;
+
+  // Places that this cloud can show
   std::vector<Eigen::Vector3f> at;
   std::vector<const Place*> places;
 
@@ -59,18 +62,21 @@ void add_layers(viewer::Points& points, const Comparison& comparison, const Show
   }
   const PointSearch search(at);
 
+  // A moved object is shown as a kind by itself
   viewer::Layer kind{"change", "Change", "", viewer::Scale::kCategory};
   for (int k = 0; k < 6; ++k) kind.names.emplace_back(name_of(static_cast<PlaceKind>(k)));
   kind.names.emplace_back("moved");
   viewer::Layer way{"way", "Way along the normal", "m", viewer::Scale::kLinear, -0.03, 0.03, 60};
   kind.values.assign(points.positions.size(), std::nanf(""));
   way.values = kind.values;
+
+  // Points and places have different origins
   const Eigen::Vector3f shift =
       (Eigen::Vector3d(points.shift[0], points.shift[1], points.shift[2]) - shown.shift).cast<float>();
 
+  // Points far from any place keep no value
   executor.parallel_for((points.positions.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
     PointSearch::Found found;
-
     for (std::size_t i = block * kBlock; i < std::min(points.positions.size(), (block + 1) * kBlock); ++i) {
       const auto& [x, y, z] = points.positions[i];
       search.nearest(Eigen::Vector3f(x, y, z) + shift, 1, found);
@@ -89,6 +95,7 @@ void add_layers(viewer::Points& points, const Comparison& comparison, const Show
   points.layers.push_back(std::move(way));
 }
 
+/// Changes as buttons that turn the view to them.
 std::string list_html(const Comparison& comparison, const Shown& shown, bool z_up) {
   std::string html;
   for (const Change& change : comparison.changes) {
@@ -104,6 +111,7 @@ std::string list_html(const Comparison& comparison, const Shown& shown, bool z_u
 
 }  // namespace
 
+/// The page changes.html: list of changes and both clouds in one view.
 core::Result<void> write_page(const std::filesystem::path& folder, const Comparison& comparison,
                               const Shown& shown, viewer::Scene& scene, const core::Executor& executor) {
   add_layers(scene.clouds[0], comparison, shown, false, executor);
@@ -112,6 +120,7 @@ core::Result<void> write_page(const std::filesystem::path& folder, const Compari
       "<p>This browser has no WebGL 2 or runs no scripts: top.png and iso.png show the map.</p>";
   const std::string title = markup(shown.before + " -> " + shown.after);
 
+  // A page without outside files works offline
   std::string html =
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/>\n"
       "<meta name=\"generator\" content=\"plumbline compare\"/>\n"
@@ -119,6 +128,7 @@ core::Result<void> write_page(const std::filesystem::path& folder, const Compari
       title + "</title>\n<style>" + kPageStyle +
       "</style></head>\n<body>\n<nav><h1>What has changed</h1>\n<p>" + title + "</p>\n";
 
+  // The list, then the viewer with both clouds
   html += list_html(comparison, shown, scene.z_up);
   html += fmt::format("<p>{}. In the median a shift of {:.1f} mm shows (95 %).</p>\n", markup(shown.placing),
                       1000.0 * comparison.median_limit_m);

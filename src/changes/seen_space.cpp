@@ -14,6 +14,7 @@ namespace plumbline::changes {
 core::Result<std::optional<SeenSpace>> SeenSpace::open(const std::filesystem::path& input,
                                                        const geometry::Rigid3& world_from_map,
                                                        const core::Executor& executor) {
+  // A result without stored views knows no free space
   const auto place = maps::find_map(input);
   if (!place || place->store.empty()) return std::optional<SeenSpace>();
   const auto run = maps::StoredRun::open_main(*place);
@@ -22,12 +23,14 @@ core::Result<std::optional<SeenSpace>> SeenSpace::open(const std::filesystem::pa
   if (!views) return tl::unexpected<core::Error>(views.error());
   if (views->size() == 0) return std::optional<SeenSpace>();
 
+  // Depth and pose of every keyframe
   SeenSpace space;
   const std::size_t count = views->size();
   space.rasters_.resize(count);
   space.camera_from_world_.resize(count);
   std::vector<std::optional<core::Error>> wrong(count);
 
+  // Errors are kept by view, so that the first one is reported
   executor.parallel_for(count, [&](std::size_t v) {
     const auto cloud = views->read(v);
     if (!cloud) {
@@ -41,6 +44,7 @@ core::Result<std::optional<SeenSpace>> SeenSpace::open(const std::filesystem::pa
         (world_from_map * views->world_from_camera[v] * cloud::sensor_pose(**cloud)).inverse();
   });
 
+  // The first and last stamps date the map
   for (const auto& error : wrong) {
     if (error) return tl::unexpected<core::Error>(*error);
   }
@@ -52,6 +56,7 @@ core::Result<std::optional<SeenSpace>> SeenSpace::open(const std::filesystem::pa
 
 std::vector<std::uint8_t> SeenSpace::looked_through(const std::vector<Eigen::Vector3f>& points,
                                                     const core::Executor& executor) const {
+  // Free space and surfaces are counted by point
   struct Votes {
     std::uint16_t free = 0, surface = 0;
   };
@@ -61,6 +66,7 @@ std::vector<std::uint8_t> SeenSpace::looked_through(const std::vector<Eigen::Vec
   limits.reserve(rasters_.size());
   for (const cloud::DepthRaster& raster : rasters_) limits.emplace_back(raster);
 
+  // Every view votes on every point of the block
   executor.parallel_for((points.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
     const std::size_t last = std::min(points.size(), (block + 1) * kBlock);
 
@@ -75,6 +81,7 @@ std::vector<std::uint8_t> SeenSpace::looked_through(const std::vector<Eigen::Vec
     }
   });
 
+  // A single view may err: it needs a clear majority
   std::vector<std::uint8_t> result(points.size());
   for (std::size_t i = 0; i < points.size(); ++i)
     result[i] =

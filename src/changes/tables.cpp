@@ -20,7 +20,7 @@ using Json = nlohmann::ordered_json;
 struct Color {
   std::uint8_t r, g, b;
 };
-/// By kind of place; colour-blind eyes tell them apart (Okabe and Ito 2008).
+/// By kind of place; colour-blind readers distinguish them (Okabe and Ito 2008).
 constexpr std::array<Color, 6> kColors = {
     {{190, 190, 190}, {230, 159, 0}, {0, 114, 178}, {213, 94, 0}, {120, 150, 165}, {165, 140, 120}}};
 /// Colours of places that moved, before and after.
@@ -33,6 +33,7 @@ Color color_of(const Place& place, const std::vector<Change>& changes) {
   return kColors[static_cast<std::size_t>(place.kind)];
 }
 
+/// Places as a cloud, coloured by kind of change.
 cloud::CloudPtr cloud_of(const Comparison& comparison) {
   auto cloud = std::make_shared<cloud::Cloud>();
   cloud->reserve(comparison.places.size());
@@ -53,6 +54,7 @@ cloud::CloudPtr cloud_of(const Comparison& comparison) {
 cloud::CloudColumns columns_of(const Comparison& comparison) {
   using Value = float (*)(const Place&);
 
+  // Columns beyond position, normal and colour
   const std::vector<std::pair<const char*, Value>> values = {
       {"kind", [](const Place& p) { return static_cast<float>(p.kind); }},
       {"later", [](const Place& p) { return p.later ? 1.0F : 0.0F; }},
@@ -64,6 +66,7 @@ cloud::CloudColumns columns_of(const Comparison& comparison) {
       {"roughness_before", [](const Place& p) { return static_cast<float>(p.distance.before.sigma_m); }},
       {"roughness_after", [](const Place& p) { return static_cast<float>(p.distance.after.sigma_m); }}};
 
+  // Column by column, in the order of the places
   cloud::CloudColumns columns;
   for (const auto& [name, value] : values) {
     cloud::CloudColumns::Other column{name, {}};
@@ -89,6 +92,7 @@ Eigen::Vector3d way_of(const Change& change) {
   return change.after.center() - change.after_from_before.inverse() * change.after.center();
 }
 
+/// The table changes.csv, one row per change.
 std::string csv_of(const Comparison& comparison, const Eigen::Vector3d& shift) {
   std::string csv =
       "number,kind,x,y,z,before_x0,before_y0,before_z0,before_x1,before_y1,before_z1,after_x0,after_y0,after_"
@@ -114,6 +118,7 @@ Json matrix_json(const geometry::Rigid3& pose) {
   return rows;
 }
 
+/// The numbers of summary.json: counts, accuracy and the transformation between the maps.
 Json summary_json(const Comparison& comparison, const Shown& shown) {
   Json places, changes = {{"appeared", 0}, {"vanished", 0}, {"moved", 0}, {"shifted", 0}};
   for (std::size_t k = 0; k < comparison.counts.size(); ++k)
@@ -136,19 +141,21 @@ Json summary_json(const Comparison& comparison, const Shown& shown) {
 
 }  // namespace
 
+/// One line about a change, for pages and the terminal.
 std::string text_of(const Change& change) {
   const auto size = [](const Eigen::AlignedBox3d& box) {
     const Eigen::Vector3d s = box.sizes();
     return fmt::format("{:.2f} x {:.2f} x {:.2f} m", s.x(), s.y(), s.z());
   };
 
+  // Moves and shifts name their distance
   switch (change.kind) {
     case ChangeKind::kMoved: {
       const double turn = change.turn_rad * 180.0 / M_PI;
-
       return fmt::format("moved by {:.2f} m{}", way_of(change).norm(),
                          std::abs(turn) < 2.0 ? "" : fmt::format(", turned by {:.0f} degrees", turn));
     }
+
     case ChangeKind::kShifted:
       return fmt::format("shifted by {:+.1f} mm (limit {:.1f} mm) over {:.2f} m2", 1000.0 * change.shift_m,
                          1000.0 * change.limit_m, change.area_m2);
@@ -160,6 +167,7 @@ std::string text_of(const Change& change) {
   return fmt::format("{}: {}", name_of(change.kind), size(change.box()));
 }
 
+/// Cloud, table and summary of the comparison.
 core::Result<void> write_tables(const std::filesystem::path& folder, const Comparison& comparison,
                                 const Shown& shown) {
   auto written = cloud::write_ply(folder / "changes.ply", *cloud_of(comparison), columns_of(comparison),
@@ -170,10 +178,13 @@ core::Result<void> write_tables(const std::filesystem::path& folder, const Compa
   return written;
 }
 
+/// Two views coloured by kind of change, and one coloured by distance.
 core::Result<void> write_pictures(const std::filesystem::path& folder, const Comparison& comparison,
                                   const Shown& shown, const core::Executor& executor) {
   viz::Scene scene;
   scene.cloud = cloud_of(comparison);
+
+  // Both views show the kinds of change
   scene.title = core::printable(shown.before + " -> " + shown.after);
   viz::SnapshotOptions options;
 
@@ -185,6 +196,7 @@ core::Result<void> write_pictures(const std::filesystem::path& folder, const Com
   }
   if (auto drawn = viz::render_snapshots(scene, snapshots, executor); !drawn) return drawn;
 
+  // The scale covers four times the median limit of detection
   for (const Place& place : comparison.places)
     scene.scalars.push_back(1000.0F * std::abs(place.distance.shift_m));
   scene.scalar_label = "distance (mm)";

@@ -32,9 +32,8 @@ const char* const kFooter =
     "5 output cannot be written or memory is short, 130 stopped before there was anything to write.\n"
     "More about a command: plumbline COMMAND --help";
 
-/// The exit code `code`, unless standard output cannot be written, of which `cause` is the errno if it is
-/// known: it is buffered, and what is lost may show only at the end. A reader that closes its pipe wants no
-/// more.
+/// `code`, unless standard output could not be written: it is buffered, so that a failure may show only at
+/// the end. `cause`: its errno, 0 if not known. A reader that has closed the pipe is not an error.
 int check_standard_output(Session& session, int code, int cause = 0) {
   errno = 0;
   std::cout.flush();
@@ -48,11 +47,13 @@ int check_standard_output(Session& session, int code, int cause = 0) {
 
 /// The exit code of the command that was named.
 int run_command(Session& session) {
+  // Libraries are silenced: the console reports
   std::cerr.rdbuf(nullptr);  // OpenCV and VTK write there what the console says with the name of the file
   ignore_write_signals();
   cv::setNumThreads(1);                                     // threads come from the executor alone
   pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // the step that called PCL reports failures
 
+  // A full disk may end any step
   std::string what;
   try {
     return check_standard_output(session, session.command());
@@ -69,6 +70,7 @@ int run_command(Session& session) {
     what = e.what();
   }
 
+  // Everything else is a defect
   session.console().error(
       fmt::format("internal error: {}; please report it with the command you gave", what));
   return static_cast<int>(core::ErrorKind::kInternal);
@@ -80,6 +82,7 @@ core::Result<std::filesystem::path> Session::pipelines_folder() const {
   return find_pipelines(pipelines_dir);
 }
 
+/// The built-in filters and those of plugins.
 core::Result<cloud::FilterRegistry> Session::filters() const {
   cloud::FilterRegistry registry = cloud::builtin_filters();
   for (const std::string& file : plugins) {
@@ -100,6 +103,7 @@ const core::Executor& Session::executor() {
   return *executor_;
 }
 
+/// Prints the error; the exit code is its kind.
 int Session::fail(const core::Error& error) {
   if (error.listed) {
     console().problems(error);
@@ -109,6 +113,7 @@ int Session::fail(const core::Error& error) {
   return static_cast<int>(error.kind);
 }
 
+/// Pipelines, filters and progress, as every run needs them.
 core::Result<void> Session::equip(pipeline::RunRequest& request) {
   const auto pipelines = pipelines_folder();
   if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
@@ -120,6 +125,7 @@ core::Result<void> Session::equip(pipeline::RunRequest& request) {
   return {};
 }
 
+/// Prints the summary; an untrustworthy result has its own exit code.
 int Session::finish(const core::Result<pipeline::RunSummary>& summary, const std::filesystem::path& output) {
   console().end_progress();
   if (!summary) return fail(summary.error());
@@ -129,6 +135,7 @@ int Session::finish(const core::Result<pipeline::RunSummary>& summary, const std
   return static_cast<int>(core::ErrorKind::kUntrustworthy);
 }
 
+/// A command with the options that all commands share.
 CLI::App* add_command(CLI::App& parent, Session& session, const std::string& name, const std::string& help,
                       std::function<int()> run) {
   CLI::App* command = parent.add_subcommand(name, help);
@@ -157,6 +164,7 @@ void add_plugin_option(CLI::App& command, Session& session) {
       ->allow_extra_args(false);
 }
 
+/// The style of progress, for people or for programs.
 void add_progress_option(CLI::App& command, Session& session) {
   const std::map<std::string, ProgressStyle> styles = {
       {"auto", ProgressStyle::kAuto}, {"json", ProgressStyle::kJson}, {"none", ProgressStyle::kNone}};
@@ -169,6 +177,7 @@ void add_progress_option(CLI::App& command, Session& session) {
       ->transform(one_of(styles));
 }
 
+/// The options of every command that runs a pipeline.
 void add_pipeline_options(CLI::App& command, Session& session, pipeline::RunRequest& request) {
   add_progress_option(command, session);
   command
@@ -188,6 +197,7 @@ std::string shift_text(const Eigen::Vector3d& shift) {
       shift.x(), shift.y(), shift.z());
 }
 
+/// Seconds after the first frame, for every command that reads recordings.
 void add_time_range(CLI::App& command, dataset::OpenOptions& open) {
   command.add_option("--from", open.from_s, "Start this many seconds after the first frame")
       ->type_name("S")
@@ -198,6 +208,7 @@ void add_time_range(CLI::App& command, dataset::OpenOptions& open) {
 }
 
 void add_topic_option(CLI::App& command, dataset::OpenOptions& open) {
+  // A role and a topic, joined by =
   const auto take = [&open](const std::vector<std::string>& given) {
     for (const std::string& pair : given) {
       const std::size_t equals = pair.find('=');
@@ -208,6 +219,7 @@ void add_topic_option(CLI::App& command, dataset::OpenOptions& open) {
                           : what == "depth_info" ? &open.topics.depth_info
                                                  : nullptr;
 
+      // A typing error is reported with the roles
       if (name == nullptr || equals == std::string::npos || equals + 1 == pair.size()) {
         throw CLI::ValidationError(
             "--topic", fmt::format("'{}' (allowed: color=, depth=, info= or depth_info= and a topic)", pair));
@@ -216,6 +228,7 @@ void add_topic_option(CLI::App& command, dataset::OpenOptions& open) {
     }
   };
 
+  // One flag for all roles
   command
       .add_option_function<std::vector<std::string>>(
           "--topic", take,
@@ -233,12 +246,14 @@ CLI::App* add_group(CLI::App& parent, const std::string& name, const std::string
 }
 
 int run(int argc, char** argv) {
+  // Options before the command
   CLI::App app("Plumbline: RGB-D recordings in, one dense coloured metric point cloud out.", "plumbline");
   app.set_version_flag("--version", version_text());
   app.require_subcommand(1);
   app.footer(kFooter);
   app.formatter(std::make_shared<PlainHelp>());
 
+  // The order of the commands in --help
   Session session;
   for (const auto add :
        {add_map,      add_localize, add_fuse,   add_hub,    add_robot,     add_keys, add_calibrate,
@@ -247,6 +262,7 @@ int run(int argc, char** argv) {
     add(app, session);
   }
 
+  // Empty values are typing errors in scripts
   refuse_empty_values(app);
 
   try {

@@ -31,6 +31,7 @@ void refuse_empty_values(CLI::App& command) {
     refuse_empty_values(*below);
 }
 
+/// The first flag of the command that ends with an equals sign.
 std::string empty_assignment(const CLI::App& app, int argc, const char* const* argv) {
   const CLI::App* command = &app;
   for (int i = 1; i < argc; ++i) {

@@ -34,7 +34,10 @@ double color_end_m(const std::vector<float>& errors) {
 
 cloud::PlyData as_ply(const evaluate::SurfaceSamples& cloud, const std::vector<float>& error_m,
                       double end_m) {
+  // Points, normals and errors by column
   cloud::PlyData ply;
+
+  // One column per axis
   const auto add_vectors = [&ply](const std::vector<Eigen::Vector3f>& vectors,
                                   const std::array<const char*, 3>& names) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -45,9 +48,11 @@ cloud::PlyData as_ply(const evaluate::SurfaceSamples& cloud, const std::vector<f
     }
   };
 
+  // Normals only if they are known
   add_vectors(cloud.points, {"x", "y", "z"});
   if (!cloud.normals.empty()) add_vectors(cloud.normals, {"nx", "ny", "nz"});
 
+  // Colours by error, for viewers
   std::array<std::vector<std::uint8_t>, 3> rgb;
   for (const float e : error_m) {
     const viz::Rgb c = viz::sequential_color(static_cast<double>(e) / end_m);
@@ -56,6 +61,7 @@ cloud::PlyData as_ply(const evaluate::SurfaceSamples& cloud, const std::vector<f
     rgb[2].push_back(c.b);
   }
 
+  // The error in metres, for programs
   ply.add("red", std::move(rgb[0]));
   ply.add("green", std::move(rgb[1]));
   ply.add("blue", std::move(rgb[2]));
@@ -67,6 +73,7 @@ cloud::PlyData as_ply(const evaluate::SurfaceSamples& cloud, const std::vector<f
   return ply;
 }
 
+/// The scene for the picture; errors in millimetres.
 viz::Scene as_scene(const evaluate::SurfaceSamples& cloud, const std::vector<float>& error_m) {
   viz::Scene scene;
   auto points = std::make_shared<pcl::PointCloud<pcl::PointXYZRGBNormal>>();
@@ -84,6 +91,7 @@ viz::Scene as_scene(const evaluate::SurfaceSamples& cloud, const std::vector<flo
 
 }  // namespace
 
+/// A cloud with errors as colours and as values, and its picture.
 core::Result<void> write_error_cloud(const std::filesystem::path& file, const std::string& title,
                                      const evaluate::SurfaceSamples& cloud, const std::vector<float>& error_m,
                                      const ErrorView& view) {

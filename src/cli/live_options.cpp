@@ -6,6 +6,7 @@
 
 namespace plumbline::cli {
 
+/// Options of live cameras.
 void add_live_options(CLI::App& command, pipeline::MapRequest& request) {
   dataset::LiveOptions& live = request.open.live;
   command
@@ -31,6 +32,7 @@ void add_publish_option(CLI::App& command, std::string& address) {
       ->type_name("ros2://DOMAIN");
 }
 
+/// Frames that the robot publishes.
 void add_frames_options(CLI::App& command, PublishRequest& publish) {
   add_publish_option(command, publish.address);
   command
@@ -58,12 +60,14 @@ void add_frames_options(CLI::App& command, PublishRequest& publish) {
 core::Result<void> prepare_publisher(Session& session, const PublishRequest& publish,
                                      net::PublishedNames names, const std::string& name,
                                      pipeline::RunRequest& request) {
+  // Frames without an address have no effect
   if (publish.address.empty()) {
     if (publish.frames.empty()) return {};
     return core::usage_error("--frames names what --publish ros2://DOMAIN sends; give that too");
   }
-  auto frames = net::parse_published_frames(publish.frames);
 
+  // Names of frames belong to one robot
+  auto frames = net::parse_published_frames(publish.frames);
   if (!frames) return tl::unexpected<core::Error>(frames.error());
   if (frames->given() && publish.robots > 1) {
     return core::usage_error(
@@ -72,6 +76,7 @@ core::Result<void> prepare_publisher(Session& session, const PublishRequest& pub
         "then begin with the robots' names");
   }
 
+  // The publisher observes the run
   frames->odom_tf = publish.odom_tf;
   frames->finished_map = publish.finished_map;
   frames->grid_heights = {publish.grid_heights[0], publish.grid_heights[1]};
@@ -80,7 +85,6 @@ core::Result<void> prepare_publisher(Session& session, const PublishRequest& pub
   auto publisher = net::open_ros2_publisher(publish.address, names, name, *frames, session.console());
   if (!publisher) return tl::unexpected<core::Error>(publisher.error());
   request.observer = std::move(*publisher);
-
   return {};
 }
 

@@ -3,6 +3,7 @@
 
 namespace plumbline::cli {
 
+/// Address and token of the page.
 void add_live_options(CLI::App& command, PageAddress& page) {
   command
       .add_option("--http", page.http,
@@ -14,6 +15,7 @@ void add_live_options(CLI::App& command, PageAddress& page) {
       ->type_name("TEXT");
 }
 
+/// The page of the growing map; none without --http.
 core::Result<std::unique_ptr<net::LiveMap>> live_map(const PageAddress& page,
                                                      const std::filesystem::path& output, Console& console) {
   if (page.http.empty()) return nullptr;

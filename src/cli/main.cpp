@@ -14,7 +14,7 @@
 
 namespace {
 
-/// oneTBB starts its threads where no exception may leave: a shortage there is told like any other.
+/// oneTBB starts its threads where no exception may leave: a shortage there is reported like any other.
 [[noreturn]] void end_at_shortage() {
   try {
     if (const std::exception_ptr thrown = std::current_exception()) std::rethrow_exception(thrown);

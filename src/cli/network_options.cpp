@@ -8,6 +8,7 @@
 namespace plumbline::cli {
 
 void add_network_options(CLI::App& command, net::NetworkOptions& options) {
+  // Domain and interface
   command
       .add_option("--domain", options.domain,
                   "DDS domain; only hub and robots of the same domain see each other (default: 0)")
@@ -18,6 +19,7 @@ void add_network_options(CLI::App& command, net::NetworkOptions& options) {
                   "Network interface (default: that of the default route; lo: this machine only)")
       ->type_name("IF");
 
+  // Peers and transport
   command
       .add_option("--peers", options.peers,
                   "Addresses of the others, for networks without multicast (default: find them by multicast)")
@@ -25,6 +27,7 @@ void add_network_options(CLI::App& command, net::NetworkOptions& options) {
       ->delimiter(',')
       ->allow_extra_args(false);
 
+  // Multicast and TCP exclude each other
   command
       .add_option_function<std::string>(
           "--transport",
@@ -34,6 +37,7 @@ void add_network_options(CLI::App& command, net::NetworkOptions& options) {
           "udp or tcp (default: udp)")
       ->check(CLI::IsMember({"udp", "tcp"}));
 
+  // Port and keys
   command
       .add_option("--port", options.port,
                   "TCP: port of the hub (default: 7500); UDP: first port (default: 7400)")
@@ -45,6 +49,7 @@ void add_network_options(CLI::App& command, net::NetworkOptions& options) {
       ->type_name("DIR");
 }
 
+/// The same options as text, for the command to repeat.
 std::string network_arguments(const net::NetworkOptions& options) {
   std::string text;
   if (options.domain != 0) text += fmt::format(" --domain {}", options.domain);

@@ -58,6 +58,7 @@ std::string as_list(const std::string& text) {
 
 }  // namespace
 
+/// One flag for each option of the table.
 void OptionFlags::add_flags() {
   for (const core::OptionSpec& spec : table_.specs()) {
     const bool shows_default = !spec.default_value.empty() && spec.default_value != "\"\"";
@@ -68,6 +69,7 @@ void OptionFlags::add_flags() {
   }
 }
 
+/// Values pass the checks of configuration files.
 core::Result<void> OptionFlags::apply() {
   core::ConfigProblems problems;
   for (const core::OptionSpec& spec : table_.specs()) {

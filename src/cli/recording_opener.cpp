@@ -5,6 +5,7 @@
 
 namespace plumbline::cli {
 
+/// Opens recordings of a result with the shipped calibrations.
 exports::OpenRecording recording_opener(Session& session) {
   return [&session](
              const exports::RecordingName& name) -> core::Result<std::unique_ptr<dataset::FrameSource>> {

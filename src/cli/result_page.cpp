@@ -45,6 +45,7 @@ std::string counted(const Json& list) {
   return fmt::format("{} entries{}{}", list.size(), fields.empty() ? "" : ": ", fields);
 }
 
+/// One line per value; long lists are counted.
 void add(const Json& value, const std::string& name, std::string& page) {
   if (value.is_object()) {
     for (const auto& [key, below] : value.items()) add(below, name.empty() ? key : name + "." + key, page);

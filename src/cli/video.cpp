@@ -45,6 +45,7 @@ core::Result<void> can_film() {
       "films need the program ffmpeg, which is not installed; name a folder instead to get the pictures");
 }
 
+/// A GIF with its own palette, or H.264 with even sides.
 core::Result<void> make_film(const std::filesystem::path& folder, int pictures_per_s,
                              const std::filesystem::path& file) {
   std::vector<std::string> words{

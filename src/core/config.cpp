@@ -52,6 +52,7 @@ bool reads_back_plain(const std::string& text) {
          ((first == '-' || first == '+') && text.size() > 1 && digit(text[1]));
 }
 
+/// A text as YAML, quoted where YAML would otherwise read something else.
 std::string text_as_yaml(const std::string& text, bool quoted) {
   if (!quoted && reads_back_plain(text)) return text;
   std::string out = "\"";
@@ -141,6 +142,7 @@ static std::string joined(const std::vector<std::string>& names) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
+/// Advice on a misspelt name: the nearest one, and the allowed ones if they are few.
 std::string hint(const std::string& word, const std::vector<std::string>& allowed) {
   constexpr std::size_t kReadable = 16;  // names; a list of a hundred would not be read
   const std::string near = did_you_mean(word, allowed);
@@ -148,6 +150,8 @@ std::string hint(const std::string& word, const std::vector<std::string>& allowe
   if (allowed.size() <= kReadable)
     return fmt::format("{} (allowed: {})", meant, allowed.empty() ? "nothing" : joined(allowed));
   if (!near.empty()) return meant;
+
+  // A long list is shortened to its groups
   std::vector<std::string> groups;  // "bundle.*" for all of them
   for (const std::string& name : allowed) {
     const std::size_t dot = name.find('.');
@@ -157,6 +161,7 @@ std::string hint(const std::string& word, const std::vector<std::string>& allowe
   return fmt::format(" (allowed: {})", joined(groups));
 }
 
+/// A tree as YAML in one line, with brackets and braces.
 std::string to_flow_yaml(const ConfigNode& node) {
   std::vector<std::string> parts;
   switch (node.kind) {

@@ -10,17 +10,20 @@ constexpr std::string_view kFormula = "=+-@\t\r'";  ///< what begins a formula, 
 
 }  // namespace
 
+/// A field as CSV; spreadsheets must not take it for a formula.
 std::string csv_field(std::string_view text) {
   const bool marked = !text.empty() && kFormula.find(text.front()) != std::string_view::npos;
   std::string field = marked ? "'" : "";
   field += text;
   if (field.find_first_of(",\"\r\n") == std::string::npos) return field;
 
+  // Quotes are doubled within quotes (RFC 4180)
   std::string quoted = "\"";
   for (const char c : field) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
   return quoted + "\"";
 }
 
+/// The inverse of csv_field().
 std::string csv_text(std::string_view field) {
   std::string text;
   if (!field.empty() && field.front() == '"') {
@@ -35,6 +38,7 @@ std::string csv_text(std::string_view field) {
   return text;
 }
 
+/// The next field of a table; commas and line ends within quotes belong to it.
 CsvField next_csv_field(std::string_view table, std::size_t& at) {
   const std::size_t begin = at;
   bool quoted = false;
@@ -43,6 +47,7 @@ CsvField next_csv_field(std::string_view table, std::size_t& at) {
     if (!quoted && (table[at] == ',' || table[at] == '\n')) break;
   }
 
+  // The line ends with its last field
   const std::size_t end = at;
   const bool last = end >= table.size() || table[end] == '\n';
   at = std::min(end + 1, table.size());

@@ -33,6 +33,7 @@ struct Executor::Job::State {
   explicit State(std::function<void()> what) : work(std::move(what)) {}
 
   void run_unless_claimed() {
+    // Whoever comes second leaves the job to the first
     if (claimed.exchange(true)) return;
     try {
       work();
@@ -40,6 +41,8 @@ struct Executor::Job::State {
       failure = std::current_exception();
     }
     work = nullptr;
+
+    // Notified under the lock, so that no waiter misses it
     const std::lock_guard<std::mutex> lock(mutex);
     done = true;
     changed.notify_all();
@@ -107,6 +110,8 @@ void Executor::Job::wait() {
   if (!state_) return;
   const auto state = std::move(state_);
   state->run_unless_claimed();
+
+  // Another thread is still at it
   std::unique_lock<std::mutex> lock(state->mutex);
   state->changed.wait(lock, [&] { return state->done; });
   if (state->failure) std::rethrow_exception(state->failure);

@@ -16,6 +16,7 @@ bool begins_as_lfs_pointer(std::string_view beginning) {
   return beginning.substr(0, kBeginning.size()) == kBeginning;
 }
 
+/// True for a file that Git LFS has not downloaded yet.
 bool is_lfs_pointer(const std::filesystem::path& file) {
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(file, ignored)) return false;

@@ -76,6 +76,7 @@ Result<Json> parse_json(std::string_view text, const std::string& name) {
     return input_error(
         fmt::format("{}: more than {} MB of JSON are not read", name, JsonLimits::kBytes / 1'000'000));
 
+  // Limits are checked before anything is allocated
   Checker checker;
   std::istringstream stream{std::string(text)};
   if (!Json::sax_parse(stream, &checker)) {

@@ -25,6 +25,7 @@ Json words(const std::vector<std::string>& choices) {
   return list;
 }
 
+/// A text that a regular expression matches literally.
 std::string escaped_for_pattern(const std::string& text) {
   std::string out;
   for (const char c : text) {
@@ -130,6 +131,7 @@ std::string allowed_text(const OptionSpec& spec) {
   return "";
 }
 
+/// A Markdown table of options, for the reference pages.
 std::string options_as_markdown(const std::vector<OptionSpec>& specs) {
   if (specs.empty()) return "";
   std::string text = "| option | default | allowed | |\n|---|---|---|---|\n";

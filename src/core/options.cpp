@@ -18,6 +18,7 @@ namespace {
 
 using Kind = ConfigNode::Kind;
 
+/// The truth value of an unquoted YAML word, if it is one.
 std::optional<bool> parse_boolean(const ConfigNode& node) {
   if (node.kind != Kind::kScalar || node.quoted) return std::nullopt;
   for (const char* word : {"true", "on", "yes"}) {
@@ -49,6 +50,7 @@ OptionSpec spec_of(std::string key, OptionType type, std::string help) {
   return spec;
 }
 
+/// A declaration of a number with its range and unit.
 OptionSpec number_spec(std::string key, OptionType type, double min, double max, const std::string& unit,
                        std::string help) {
   OptionSpec spec = spec_of(std::move(key), type, std::move(help));
@@ -64,6 +66,8 @@ OptionTable& OptionTable::add(OptionSpec spec, Binding binding) {
   for (const OptionSpec& other : specs_) {
     if (other.key == spec.key) throw std::logic_error("option declared twice: " + spec.key);
   }
+
+  // The value at declaration is the default
   spec.default_value = binding.print();
   specs_.push_back(std::move(spec));
   bindings_.push_back(std::move(binding));
@@ -86,6 +90,8 @@ OptionTable& OptionTable::integer(std::string key, int& value, Range<int> range,
   const auto parse = [&value, range, unit](const ConfigNode& node) -> std::string {
     const ParsedNumber parsed = parse_in_range(node, range.min, range.max, unit);
     if (!parsed.wrong.empty()) return parsed.wrong;
+
+    // Numbers such as 3.0 are accepted, 3.5 is not
     if (parsed.value != std::floor(parsed.value)) {
       return fmt::format("{} is not a whole number (allowed: {})", node.scalar,
                          range_text(range.min, range.max, unit));
@@ -114,6 +120,7 @@ OptionTable& OptionTable::text(std::string key, std::string& value, std::string 
   OptionSpec spec = spec_of(std::move(key), OptionType::kText, std::move(help));
   spec.empty = empty;
   const auto parse = [&value](const ConfigNode& node) -> std::string {
+    // Numbers and booleans without quotes are texts here
     if (node.kind != Kind::kScalar) return describe(node) + " is not a text";
     value = node.scalar;
     return "";
@@ -128,6 +135,7 @@ OptionTable& OptionTable::text_or_list(std::string key, ConfigNode& value, std::
   spec.empty = empty;
   spec.list_of = list_of;
   const auto parse = [&value, list_of](const ConfigNode& node) -> std::string {
+    // The owner reads the tree later and reports its problems
     if (node.kind != Kind::kScalar && node.kind != Kind::kSequence) {
       return fmt::format("{} is neither a file nor a list of {}", describe(node), list_of);
     }
@@ -151,6 +159,7 @@ OptionTable& OptionTable::numbers(std::string key, std::vector<double>& value, s
       number_spec(std::move(key), OptionType::kNumbers, range.min, range.max, unit, std::move(help));
   spec.length = length;
 
+  // A wrong element is reported with its position
   const auto parse = [&value, length, range, unit](const ConfigNode& node) -> std::string {
     if (node.kind != Kind::kSequence) return describe(node) + " is not a list of numbers, like [1, 2, 3]";
     if (length != 0 && node.items.size() != length) {
@@ -168,6 +177,7 @@ OptionTable& OptionTable::numbers(std::string key, std::vector<double>& value, s
     return "";
   };
 
+  // Printed as the parser would read it
   const auto print = [&value, unit]() {
     std::vector<std::string> texts;
     for (const double v : value) texts.push_back(with_unit(v, unit));
@@ -182,6 +192,7 @@ void OptionTable::set(const std::string& key, const ConfigNode& value, const std
   for (std::size_t i = 0; i < specs_.size(); ++i) {
     if (specs_[i].key != key) continue;
 
+    // An empty text mostly is an unset shell variable
     if (value.kind == Kind::kScalar && value.scalar.empty() && !takes_empty(specs_[i])) {
       problems.push_back(
           {value.mark, full_path,
@@ -189,6 +200,7 @@ void OptionTable::set(const std::string& key, const ConfigNode& value, const std
       return;
     }
 
+    // Choices get advice on misspelt names
     std::string wrong = bindings_[i].parse(value);
     if (!wrong.empty() && specs_[i].type == OptionType::kChoice) {
       wrong = describe(value) + " is not one of the choices" + hint(value.scalar, specs_[i].choices);
@@ -197,6 +209,7 @@ void OptionTable::set(const std::string& key, const ConfigNode& value, const std
     return;
   }
 
+  // Advice for a misspelt key
   std::vector<std::string> keys;
   for (const OptionSpec& spec : specs_) keys.push_back(spec.key);
   problems.push_back({value.mark, full_path, "unknown key" + hint(key, keys)});
@@ -209,11 +222,15 @@ void OptionTable::set_all(const ConfigNode& map, const std::string& path, Config
     problems.push_back({map.mark, path, describe(map) + " is not a map of options (key: value)"});
     return;
   }
+
+  // Reserved keys are known to the caller
   std::vector<std::string> keys = reserved;
   for (const OptionSpec& spec : specs_) keys.push_back(spec.key);
   for (std::size_t i = 0; i < map.entries.size(); ++i) {
     const auto& [key, value] = map.entries[i];
     if (std::find(reserved.begin(), reserved.end(), key) != reserved.end()) continue;
+
+    // An unknown key is reported where the key stands
     if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
       problems.push_back({map.key_marks[i], joined_path(path, key), "unknown key" + hint(key, keys)});
     } else {

@@ -46,11 +46,13 @@ OutputFile::OutputFile(std::filesystem::path target) : target_(std::move(target)
     if (!error) real = std::move(resolved);
   }
 
+  // Folders cannot be replaced by files
   if (std::filesystem::is_directory(real, error)) {
     problem_ = target_.string() + ": is a folder; " + remedy(EISDIR);
     return;
   }
 
+  // Pipes and devices are written in place; a file is written elsewhere and renamed
   const bool device = std::filesystem::exists(real, error) && !std::filesystem::is_regular_file(real, error);
   if (device) {
     written_ = real;
@@ -61,11 +63,13 @@ OutputFile::OutputFile(std::filesystem::path target) : target_(std::move(target)
     descriptor_ = ::open(written_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   }
 
+  // The cause decides the advice
   if (descriptor_ < 0) {
     fail("cannot be opened for writing", errno);
     return;
   }
 
+  // Errors name the file that the link points to
   target_ = real;
   buffer_.reserve(kBuffer);
 }
@@ -75,6 +79,8 @@ OutputFile::~OutputFile() { discard(); }
 void OutputFile::write(const void* bytes, std::size_t count) {
   if (!problem_.empty()) return;
   const char* from = static_cast<const char*>(bytes);
+
+  // Small writes are collected; the system is called for full buffers only
   while (count > 0) {
     const std::size_t part = std::min(count, kBuffer - buffer_.size());
     buffer_.insert(buffer_.end(), from, from + part);
@@ -86,6 +92,8 @@ void OutputFile::write(const void* bytes, std::size_t count) {
 
 void OutputFile::flush() {
   std::size_t done = 0;
+
+  // A signal may interrupt a write; it is then repeated
   while (done < buffer_.size() && problem_.empty()) {
     const ssize_t n = ::write(descriptor_, buffer_.data() + done, buffer_.size() - done);
     if (n >= 0) {

@@ -12,6 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// True if a path matches; `*` stands for anything within a folder, `**` at the end for everything below.
 bool matches(std::string_view pattern, std::string_view path) {
   while (!pattern.empty() && pattern.front() != '*') {
     if (path.empty() || path.front() != pattern.front()) return false;
@@ -21,6 +22,7 @@ bool matches(std::string_view pattern, std::string_view path) {
   if (pattern.empty()) return path.empty();
   if (pattern == "**") return true;
 
+  // A star takes as many characters as needed, but no slash
   const std::string_view rest = pattern.substr(1);
   for (std::size_t taken = 0;; ++taken) {
     if (matches(rest, path.substr(taken))) return true;
@@ -85,6 +87,7 @@ std::vector<std::string> files_below(const fs::path& folder) {
   return listed_below(folder, unlisted);
 }
 
+/// Files below the folder that do not match any of `names`: they belong to the user.
 std::vector<std::string> foreign_files(const fs::path& folder, const FileNames& names) {
   std::vector<std::string> foreign;
   for (const std::string& file : files_below(folder)) {

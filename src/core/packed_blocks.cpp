@@ -46,6 +46,7 @@ bool PackedBlocks::write(const Place& place) const {
 }
 
 std::size_t PackedBlocks::add(const Bytes& block) {
+  // A block that cannot be written to disk stays in memory
   Place place{end_, 0, pack(block)};
   place.size = place.packed.size();
   bytes_ += place.size;
@@ -59,6 +60,8 @@ std::size_t PackedBlocks::add(const Bytes& block) {
 
 std::optional<Bytes> PackedBlocks::get(std::size_t number) const {
   const Place& place = places_.at(number);
+
+  // The disk had no room for this block
   if (!place.packed.empty()) return unpack(place.packed.data(), place.size);
 
   Bytes packed(place.size);

@@ -12,6 +12,8 @@ namespace plumbline::core {
 Bytes pack(const Bytes& bytes) {
   const std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> context(ZSTD_createCCtx(), &ZSTD_freeCCtx);
   if (context == nullptr) throw std::bad_alloc();
+
+  // The fastest level; a checksum detects damage
   ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, 1);
   ZSTD_CCtx_setParameter(context.get(), ZSTD_c_checksumFlag, 1);
   Bytes packed(ZSTD_compressBound(bytes.size()));

@@ -65,11 +65,13 @@ std::string remedy(const std::string& name) {
 
 }  // namespace
 
+/// Loads a part of the program from its library folders; `layout` must be that of this build.
 Result<const void*> load_part(const std::string& name, std::uint64_t layout) {
   const std::string file = fmt::format("plumbline_{}.so", name);
   const std::vector<fs::path> folders = library_folders();
   std::error_code ec;
 
+  // Only in the library folders, never in the current one
   const auto folder = std::find_if(folders.begin(), folders.end(),
                                    [&](const fs::path& f) { return fs::exists(f / file, ec); });
   if (folder == folders.end()) {
@@ -79,12 +81,14 @@ Result<const void*> load_part(const std::string& name, std::uint64_t layout) {
                     folders.empty() ? "lib/plumbline" : folders.front().lexically_normal().string()));
   }
 
+  // Errors that a new installation remedies
   const std::string path = (*folder / file).lexically_normal().string();
   const auto unfit = [&path](const std::string& why) {
     return failure(ErrorKind::kInternal,
                    fmt::format("{}: this part of Plumbline {}; install Plumbline again", path, why));
   };
 
+  // Symbols stay local, so that parts do not mix
   void* handle = dlopen(path.c_str(), RTLD_LAZY | RTLD_LOCAL | symbol_order());
   if (handle == nullptr) {
     const char* words = dlerror();
@@ -94,10 +98,12 @@ Result<const void*> load_part(const std::string& name, std::uint64_t layout) {
     return unfit(fmt::format("cannot be loaded ({})", why));
   }
 
+  // The entry point gives the table of functions
   using Entry = PartEntry (*)();
   const auto entry = reinterpret_cast<Entry>(dlsym(handle, "plumbline_part"));
   if (entry == nullptr) return unfit("has no functions");
 
+  // Parts of another build may differ in their types
   const PartEntry found = entry();
   if (found.layout != layout) return unfit("was not built together with this program");
   return found.functions;

@@ -20,6 +20,7 @@ bool holds(const std::string& text, const char* part) { return text.find(part) !
 
 }  // namespace
 
+/// Advice on a lack of memory or file handles; empty for other causes.
 std::string shortage_of(int cause) {
   switch (cause) {
     case ENOMEM:
@@ -46,6 +47,7 @@ std::string shortage_of(const std::exception& problem) {
 }
 
 std::string shortage_of_linker(const std::string& message) {
+  // The dynamic linker reports its errors as text only
   if (holds(message, std::strerror(EMFILE)) || holds(message, std::strerror(ENFILE))) return kOpenFiles;
   const bool memory = holds(message, std::strerror(ENOMEM)) || holds(message, "failed to map segment") ||
                       holds(message, "cannot create shared object descriptor") ||

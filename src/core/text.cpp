@@ -19,16 +19,20 @@ std::string ending_of(const std::filesystem::path& file) { return lower(file.ext
 Character first_character(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned char first = byte(0);
+
+  // One byte of ASCII
   if (first < 0x80) return {first, 1};
   const std::size_t bytes = first >= 0xf0 ? 4 : first >= 0xe0 ? 3 : 2;
   if (first < 0xc2 || first > 0xf4 || bytes > text.size()) return {};
 
+  // Each further byte carries six bits
   std::uint32_t code = first & (0xffU >> (bytes + 1));
   for (std::size_t i = 1; i < bytes; ++i) {
     if ((byte(i) & 0xc0U) != 0x80U) return {};
     code = (code << 6) | (byte(i) & 0x3fU);
   }
 
+  // Overlong forms and surrogates are not valid UTF-8
   constexpr std::uint32_t kLeast[] = {0, 0, 0x80, 0x800, 0x10000};  // a longer form than needed is none
   const bool surrogate = code >= 0xd800 && code <= 0xdfff;
   return code < kLeast[bytes] || code > 0x10ffff || surrogate ? Character{} : Character{code, bytes};
@@ -36,6 +40,7 @@ Character first_character(std::string_view text) {
 
 bool is_control(std::uint32_t code) { return code < 0x20 || (code >= 0x7f && code < 0xa0); }
 
+/// Text for a terminal: invalid UTF-8 and control characters are made visible.
 std::string printable(std::string_view text, Lines lines) {
   std::string shown;
   while (!text.empty()) {

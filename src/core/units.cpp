@@ -52,6 +52,7 @@ std::string allowed_units(const std::string& unit) {
                      fmt::join(units_like(unit), ", "));
 }
 
+/// A number in the option's unit; the text may carry another unit of the same quantity.
 ParsedNumber parse_number(const ConfigNode& node, const std::string& unit) {
   const auto wrong = [](std::string what) { return ParsedNumber{0.0, std::move(what)}; };
   const auto no_number = [&] {
@@ -60,19 +61,23 @@ ParsedNumber parse_number(const ConfigNode& node, const std::string& unit) {
   if (node.kind != ConfigNode::Kind::kScalar) return no_number();
   if (node.quoted) return wrong(describe(node) + " is text; write the number without quotes");
 
+  // std::from_chars accepts no plus sign
   std::string_view text = node.scalar;
   if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
   ParsedNumber parsed;
   const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), parsed.value);
   if (code != std::errc() || !std::isfinite(parsed.value)) return no_number();
 
+  // A bare number has the option's unit
   text.remove_prefix(static_cast<std::size_t>(end - text.data()));
   while (!text.empty() && text.front() == ' ') text.remove_prefix(1);
   if (text.empty() || text == unit) return parsed;
 
+  // A frequent slip deserves advice by itself
   if (text.size() > 1 && text[0] == ',' && text[1] >= '0' && text[1] <= '9')
     return wrong(describe(node) + ": decimal comma; write numbers with a point");
 
+  // Units must be of the same quantity
   const Unit* from = find_unit(text);
   const Unit* to = find_unit(unit);
   if (from == nullptr || to == nullptr || from->quantity != to->quantity) {
@@ -80,6 +85,7 @@ ParsedNumber parse_number(const ConfigNode& node, const std::string& unit) {
                              unit.empty() ? "a number without unit" : allowed_units(unit)));
   }
 
+  // One division rounds once
   parsed.value = parsed.value * (from->numerator * to->denominator) / (from->denominator * to->numerator);
   return parsed;
 }
@@ -94,6 +100,7 @@ ParsedNumber parse_in_range(const ConfigNode& node, double min, double max, cons
   return parsed;
 }
 
+/// Units of the same quantity; a ratio is written without a unit.
 std::vector<std::string> units_like(const std::string& unit) {
   if (unit.empty()) return {};
   const Unit* own = find_unit(unit);
@@ -131,6 +138,8 @@ std::string describe(const ConfigNode& node) {
     case ConfigNode::Kind::kScalar:
       break;
   }
+
+  // Long texts are cut to stay readable
   constexpr std::size_t kShown = 40;
   const bool longer = node.scalar.size() > kShown;
   return fmt::format("'{}{}'", node.scalar.substr(0, kShown), longer ? "..." : "");

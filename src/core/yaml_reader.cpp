@@ -65,6 +65,7 @@ class TreeBuilder : public YAML::EventHandler {
   }
   void OnScalar(const YAML::Mark& at, const std::string& tag, YAML::anchor_t anchor,
                 const std::string& value) override {
+    // yaml-cpp tags quoted texts with an exclamation mark
     check_tag(at, tag);
     ConfigNode node;
     node.kind = ConfigNode::Kind::kScalar;
@@ -151,10 +152,14 @@ class TreeBuilder : public YAML::EventHandler {
   void start(ConfigNode::Kind kind, const YAML::Mark& at, const std::string& tag, YAML::anchor_t anchor) {
     count(1, mark(at));
     check_tag(at, tag);
+
+    // A limit on depth protects the recursion
     if (open_.size() >= kMaxDepth) too_deep(mark(at));
     if (!open_.empty() && open_.back().node.kind == ConfigNode::Kind::kMap && !open_.back().has_key) {
       refuse(mark(at), "a key must be a plain word");
     }
+
+    // The node joins its parent when it ends
     Open open;
     open.node.kind = kind;
     open.node.mark = mark(at);
@@ -164,6 +169,8 @@ class TreeBuilder : public YAML::EventHandler {
   void end() {
     Open done = std::move(open_.back());
     open_.pop_back();
+
+    // Aliases may copy this node later
     if (done.anchor != 0) {
       const std::size_t nodes = count_nodes(done.node);
       count(nodes, done.node.mark);  // the anchor keeps a copy: anchors within anchors add up
@@ -177,6 +184,8 @@ class TreeBuilder : public YAML::EventHandler {
       return;
     }
     Open& parent = open_.back();
+
+    // A map takes a key and a value in turn
     if (parent.node.kind == ConfigNode::Kind::kSequence) {
       parent.node.items.push_back(std::move(node));
     } else if (!parent.has_key) {
@@ -195,6 +204,8 @@ class TreeBuilder : public YAML::EventHandler {
     parent.key_mark = key.mark;
     parent.has_key = true;
     parent.duplicate = false;
+
+    // The first of two equal keys counts
     const auto [first, fresh] = parent.lines.emplace(key.scalar, key.mark.line);
     if (fresh) return;
     parent.duplicate = true;
@@ -218,6 +229,7 @@ void check_characters(const std::string& text, const std::string& file) {
   int column = 1;
   int open = 0;  // brackets, those in comments and quotes as well
 
+  // Limits are checked before yaml-cpp allocates
   for (const char c : text) {
     open += c == '[' || c == '{' ? 1 : c == ']' || c == '}' ? -1 : 0;
     if (column > kMaxColumns || open > kMaxOpenBrackets) {
@@ -227,6 +239,7 @@ void check_characters(const std::string& text, const std::string& file) {
                                           : fmt::format("over {} brackets are open here", kMaxOpenBrackets)}};
     }
 
+    // Columns count from the line's beginning
     const auto byte = static_cast<unsigned char>(c);
     if (c == '\n') {
       ++line;
@@ -234,6 +247,7 @@ void check_characters(const std::string& text, const std::string& file) {
       continue;
     }
 
+    // Binary files end here
     if (byte < 0x20 && c != '\t' && c != '\r') {
       throw Refused{{{file, line, column},
                      "",
@@ -265,13 +279,16 @@ std::optional<ConfigNode> parse_yaml(const std::string& text, const std::string&
       throw Refused{{{file_name, 0, 0}, "", "the file is over 1 MB; this is not a configuration file"}};
     }
 
+    // Building the tree checks depth and number of nodes
     check_characters(text, file_name);
     std::istringstream stream(text);
     YAML::Parser parser(stream);
+
     TreeBuilder builder(file_name, problems);
     while (parser.HandleNextDocument(builder)) {
     }
 
+    // Nothing but comments gives an empty tree
     ConfigNode root = builder.take_root();
     if (root.mark.file.empty()) root.mark.file = file_name;  // an empty document has no place of its own
     return root;
@@ -292,6 +309,7 @@ std::optional<ConfigNode> read_yaml(const std::filesystem::path& file, ConfigPro
   if (std::filesystem::is_directory(file, ignored)) {
     return unreadable(file, "is a folder, not a YAML file", problems);
   }
+
   std::ifstream stream(file, std::ios::binary);
   if (!stream) {
     // Not a fault of the configuration, so it ends the command as missing memory does.
@@ -320,6 +338,7 @@ Result<ConfigNode> read_yaml(const std::filesystem::path& file) {
   return whole(std::move(node), problems);
 }
 
+/// Names of the YAML files of a folder without their ending, sorted.
 std::vector<std::string> yaml_names(const std::filesystem::path& folder) {
   std::vector<std::string> names;
   std::error_code ignored;

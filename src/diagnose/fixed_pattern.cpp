@@ -49,6 +49,7 @@ Sign fixed_pattern_sign(const Samples& samples) {
   std::vector<Sample> all = samples.samples();
   double strong = 0.0;
 
+  // Two frames of each group, some time apart.
   for (std::size_t k = 0; k < all.size() && details.size() < kFrames; ++k) {
     if (k % 4 != 0 && k % 4 != 3) continue;
     details.push_back(details_of(all[k].gray));
@@ -75,6 +76,7 @@ Sign fixed_pattern_sign(const Samples& samples) {
     }
   }
 
+  // Share of all details, and share of all pixels.
   const double share = strong > 0.0 ? static_cast<double>(fixed * n) / strong : 0.0;
   const double of_picture = static_cast<double>(fixed) / static_cast<double>(details.front().total());
   sign.size = share;

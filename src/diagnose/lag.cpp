@@ -43,6 +43,7 @@ struct Motion {
 Eigen::Vector2d translation(const cv::Mat& a, const cv::Mat& b, float most, bool zero_is_none) {
   Eigen::Vector2d t = Eigen::Vector2d::Zero();
 
+  // Gauss-Newton over translation, gain and offset.
   for (int round = 0; round < 4; ++round) {
     Eigen::Matrix4d normal = Eigen::Matrix4d::Identity() * 1e-6;
     Eigen::Vector4d right = Eigen::Vector4d::Zero();
@@ -56,6 +57,7 @@ Eigen::Vector2d translation(const cv::Mat& a, const cv::Mat& b, float most, bool
         const auto* down = b.ptr<float>(iv + 1);
         const auto* row = a.ptr<float>(v);
 
+        // Four for the interpolation, five for value and gradient.
         const float values[] = {up[iu],
                                 up[iu + 1],
                                 down[iu],
@@ -65,15 +67,19 @@ Eigen::Vector2d translation(const cv::Mat& a, const cv::Mat& b, float most, bool
                                 row[u + 1],
                                 a.ptr<float>(v - 1)[u],
                                 a.ptr<float>(v + 1)[u]};
+
+        // Unknown depths cannot be compared.
         if (zero_is_none &&
             std::any_of(std::begin(values), std::end(values), [](float z) { return !(z > 0.0F); }))
           continue;
 
+        // Bilinear interpolation, central differences.
         const double fx = x - iu, fy = y - iv;
         const double there = (values[0] * (1.0 - fx) + values[1] * fx) * (1.0 - fy) +
                              (values[2] * (1.0 - fx) + values[3] * fx) * fy;
         const double gx = 0.5 * (values[6] - values[4]), gy = 0.5 * (values[8] - values[7]);
 
+        // Huber's weight limits occlusions.
         const double difference = values[5] - there;
         const double w = std::abs(difference) < most ? 1.0 : most / std::abs(difference);
         const Eigen::Vector4d row4(gx, gy, values[5], 1.0);
@@ -82,6 +88,7 @@ Eigen::Vector2d translation(const cv::Mat& a, const cv::Mat& b, float most, bool
       }
     }
 
+    // Small steps, for the linearisation holds nearby.
     const Eigen::Vector4d step = normal.ldlt().solve(right);
     t += step.head<2>().cwiseMax(-2.0).cwiseMin(2.0);
     t = t.cwiseMax(-8.0).cwiseMin(8.0);
@@ -95,6 +102,7 @@ cv::Mat blurred(const cv::Mat& image) {
   return smooth;
 }
 
+/// Image motion and depth motion between successive thumbnails, per second.
 std::vector<Motion> motions_of(const std::vector<Thumbnail>& all) {
   std::vector<Motion> motions;
   for (std::size_t k = 1; k < all.size(); ++k) {
@@ -182,7 +190,7 @@ std::vector<Sign> lag_signs(const Samples& samples) {
   const double none = correlation(motions, 0.0, 0.0);
   double constant = none, best = none, delay = 0.0, begin = 0.0, drift = 0.0, quick_constant = 0.0;
 
-  // The best delay, and the best delay that grows.
+  // The best constant delay, and the best one that grows linearly.
   for (double d = -kMostDelay_s; d <= kMostDelay_s + 1e-9; d += kDelayStep_s) {
     quick_constant = std::max(quick_constant, correlation(quick, d, 0.0));
 
@@ -194,6 +202,7 @@ std::vector<Sign> lag_signs(const Samples& samples) {
 
   const auto unexplained = [](double c) { return std::max(1e-3, 1.0 - c * c); };
 
+  // Depth that lags more and more.
   lags.size = drift;
   const double quick_lag = correlation(quick, begin, drift);
   if (grade(lags, {std::abs(drift) / kDrift_s, (quick_lag - quick_constant) / kQuickGain,
@@ -207,6 +216,7 @@ std::vector<Sign> lag_signs(const Samples& samples) {
         "record again with both streams stamped by one clock, or pair the images by the time of exposure";
   }
 
+  // Depth with a constant delay.
   late.size = delay;
   const double quick_late = correlation(quick, delay, 0.0), quick_none = correlation(quick, 0.0, 0.0);
   if (grade(late, {std::abs(delay) / kDelay_s, (quick_late - quick_none) / kQuickLate,

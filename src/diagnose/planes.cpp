@@ -40,6 +40,7 @@ struct Field {
   }
 };
 
+/// Depth on the grid, with the directions of its rays.
 Field field_of(const Sample& sample, const sensor::Pinhole& camera) {
   Field f;
   f.width = sample.depth.cols / kGrid;
@@ -104,6 +105,7 @@ class PlaneGrower {
   [[nodiscard]] std::size_t at(int u, int v) const { return static_cast<std::size_t>(v * f_.width + u); }
 
   bool grow(Kind kind, int u, int v) {
+    // First plane from the seed's surroundings.
     PlaneFit first;
     int count = 0;
     for (int y = std::max(0, v - kSeedHalf); y <= std::min(f_.height - 1, v + kSeedHalf); ++y) {
@@ -113,8 +115,11 @@ class PlaneGrower {
         ++count;
       }
     }
+
+    // Too few points for a plane.
     if (count < 60) return false;
 
+    // Grown from the seed, fitted to its region again.
     Eigen::Vector3d plane = first.solve();
     for (int round = 0; round < 3; ++round) {
       flood(kind, at(u, v), plane);
@@ -123,6 +128,8 @@ class PlaneGrower {
       for (const std::size_t i : region_) all.add(f_, kind, i);
       plane = all.solve();
     }
+
+    // The region of the last fit.
     flood(kind, at(u, v), plane);
     return region_.size() >= kLeastRegion;
   }
@@ -146,6 +153,7 @@ class PlaneGrower {
     return {solution.w(), 1.0 / normal.inverse()(3, 3)};
   }
 
+  /// Connected grid points on the plane, from the seed on.
   void flood(Kind kind, std::size_t seed, const Eigen::Vector3d& plane) {
     seen_.assign(f_.d.size(), 0);
     region_.clear();
@@ -193,6 +201,7 @@ struct Planes {
   }
 };
 
+/// Planes bend if depth is the distance along the ray.
 Sign ray_sign(const Planes& along_z, const Planes& along_ray) {
   Sign sign{"ray_distance", "of the bend of distances along the ray"};
   if (std::min(along_z.bends.size(), along_ray.bends.size()) < kLeastPlanes) return sign;
@@ -212,6 +221,7 @@ Sign ray_sign(const Planes& along_z, const Planes& along_ray) {
   return sign;
 }
 
+/// Depth read as disparity covers more with fewer planes.
 Sign disparity_sign(const Planes& depth, const Planes& disparity) {
   Sign sign{"disparity", "times fewer planes"};
   if (std::min(depth.bends.size(), disparity.bends.size()) < kLeastPlanes) return sign;
@@ -233,6 +243,8 @@ std::vector<Sign> depth_kind_signs(const Samples& samples) {
   const std::vector<Sample> all = samples.samples();
   for (std::size_t k = 0; k < all.size(); k += 4) {
     const Field field = field_of(all[k], samples.depth_camera());
+
+    // Too little depth for planes.
     if (field.measured < 4 * kLeastRegion) continue;
     PlaneGrower grower(field);
     for (const Kind kind : {kAlongZ, kAlongRay, kDisparity})

@@ -52,7 +52,9 @@ double agreement(const Sample& a, const Sample& b, const sensor::Pinhole& camera
   return all > 100 ? static_cast<double>(good) / static_cast<double>(all) : -1.0;
 }
 
+/// Poses as given, and as they would be after one known mistake.
 std::vector<Variant> variants_of(const PoseAt& given) {
+  // A variant that changes every pose.
   const auto changed = [given](auto change) {
     return [given, change](double stamp) -> std::optional<Rigid3> {
       const auto pose = given(stamp);
@@ -60,6 +62,7 @@ std::vector<Variant> variants_of(const PoseAt& given) {
     };
   };
 
+  // Conventions of other programs.
   std::vector<Variant> all;
   all.push_back({"given", "", "", given});
   const char* what[] = {"the poses are inverted: they take points of the world to the camera",
@@ -70,6 +73,7 @@ std::vector<Variant> variants_of(const PoseAt& given) {
                    changed([c = convention](const Rigid3& p) { return geometry::read_by(c, p); })});
   }
 
+  // Positions in other units.
   for (const double unit : {0.001, 0.01, 0.1, 10.0, 100.0, 1000.0}) {
     all.push_back({"scale",
                    fmt::format("the positions of the poses are not metres: times {:g} they fit depth", unit),
@@ -77,6 +81,7 @@ std::vector<Variant> variants_of(const PoseAt& given) {
                    changed([unit](const Rigid3& p) { return Rigid3(p.rotation, p.translation * unit); })});
   }
 
+  // Stamps of another clock.
   for (const double late : {-1.0, -0.5, -0.3, -0.2, -0.1, 0.1, 0.2, 0.3, 0.5, 1.0}) {
     all.push_back({"time",
                    fmt::format("the stamps of the poses are about {:g} s {}", std::abs(late),
@@ -121,6 +126,7 @@ Sign pose_sign(const Samples& samples, const geometry::Trajectory& poses) {
     }
   }
 
+  // The variant with the largest gain over most pairs.
   std::size_t best = 0;
   double gain = 1.0;
   for (std::size_t v = 1; v < variants.size(); ++v) {
@@ -130,6 +136,7 @@ Sign pose_sign(const Samples& samples, const geometry::Trajectory& poses) {
     if (here > gain) gain = here, best = v;
   }
 
+  // Certain only with a clear gain.
   sign.size = gain;
   if (!grade(sign, {gain / kCertainGain, best > 0 ? 2.0 : 0.0})) return sign;
   const double n = static_cast<double>(count[best]);

@@ -63,6 +63,7 @@ cv::Mat relative_gradient(const cv::Mat& gray, int dx, int dy, cv::Size size) {
   return relative;
 }
 
+/// Depth steps along rows (`across`) or columns, in pixels of the working image from its centre.
 void add_steps(const cv::Mat& depth, bool across, double work_from_depth, std::vector<Edge>& edges) {
   const int outer = across ? depth.rows : depth.cols;
   const int inner = across ? depth.cols : depth.rows;
@@ -74,16 +75,21 @@ void add_steps(const cv::Mat& depth, bool across, double work_from_depth, std::v
       const float z = z_at(o, i);
       if (!(z > 0.0F)) continue;
 
+      // A wide hole may hide a slope.
       if (last >= 0 && i - last <= kMostGap) {
         const float before = z_at(o, last);
-
         if (std::abs(z - before) > kStep * std::min(z, before) + 0.03F) {
+          // The edge belongs to the nearer surface.
           const double at = z < before ? i - 0.5 : last + 0.5;
+
+          // Relative to the image's centre.
           const double u = (across ? at : o) * work_from_depth - 0.5 * (depth.cols * work_from_depth - 1.0);
           const double v = (across ? o : at) * work_from_depth - 0.5 * (depth.rows * work_from_depth - 1.0);
           edges.push_back({static_cast<float>(u), static_cast<float>(v), std::min(z, before), across});
         }
       }
+
+      // The last pixel with depth, on this side of holes.
       last = i;
     }
   }
@@ -127,6 +133,7 @@ struct Search {
   double spread = 1.0;
 };
 
+/// Scores of all scales and shifts in range.
 Search search(const std::vector<Frame>& frames, std::size_t half) {
   Search found;
   double sum = 0.0, squares = 0.0;
@@ -147,6 +154,7 @@ Search search(const std::vector<Frame>& frames, std::size_t half) {
     }
   }
 
+  // Spread of scores, to judge the best one.
   found.mean = sum / count;
   found.spread = std::sqrt(std::max(1e-9, squares / count - found.mean * found.mean));
   return found;
@@ -172,12 +180,14 @@ Sign registration_sign(const Samples& samples) {
   std::vector<Frame> frames;
   const std::vector<Sample> all = samples.samples();
 
+  // Two frames of each group.
   for (std::size_t k = 0; k < all.size(); ++k) {
     if (k % 4 != 0 && k % 4 != 3) continue;
     const Sample& sample = all[k];
     const cv::Size size(kWorkWidth, kWorkWidth * sample.gray.rows / sample.gray.cols);
     Frame frame{relative_gradient(sample.gray, 1, 0, size), relative_gradient(sample.gray, 0, 1, size), {}};
 
+    // Edges along both directions, thinned out.
     const double work_from_depth = static_cast<double>(kWorkWidth) / sample.depth.cols;
     add_steps(sample.depth, true, work_from_depth, frame.edges);
     add_steps(sample.depth, false, work_from_depth, frame.edges);
@@ -199,6 +209,7 @@ Sign registration_sign(const Samples& samples) {
   const double kept = std::max(a_now / std::max(a_by_b, 1e-3), b_now / std::max(b_by_a, 1e-3));
   const double off = std::min(distance(frames, a.best, {}), distance(frames, b.best, {}));
 
+  // Evidence: fit, gain, loss and size.
   const double px = static_cast<double>(all.front().gray.cols) / kWorkWidth;
   sign.size = off * px;
   if (!grade(sign, {std::min(a_by_b, b_by_a) / kFits, gain / kBetter, (1.0 - kept) / kLost, off / kOff}))

@@ -38,6 +38,8 @@ cv::Mat thinned(const cv::Mat& depth, int step) {
 /// Mean inverse depth of each block of the thinned image.
 cv::Mat inverse_thumbnail(const cv::Mat& depth, cv::Size size) {
   cv::Mat small(size, CV_32FC1);
+
+  // A few pixels represent each block.
   const int bu = std::max(1, depth.cols / size.width);
   const int bv = std::max(1, depth.rows / size.height);
   const int step = std::max(1, bu / 4);
@@ -48,6 +50,7 @@ cv::Mat inverse_thumbnail(const cv::Mat& depth, cv::Size size) {
       float sum = 0.0F;
       int count = 0;
 
+      // Mean of the known depths in the block.
       for (int y = v * bv; y < std::min((v + 1) * bv, depth.rows); y += step) {
         const auto* row = depth.ptr<float>(y);
         for (int x = u * bu; x < std::min((u + 1) * bu, depth.cols); x += step) {
@@ -73,6 +76,8 @@ Samples::Samples(const sensor::Pinhole& camera, std::size_t frames) : camera_(ca
 bool Samples::wants_sample(std::size_t index) const {
   for (std::size_t g = 0; g < kGroups; ++g) {
     const std::size_t start = group_start(g, frames_);
+
+    // Neighbours at several distances in time.
     for (const std::size_t offset : kOffsets) {
       if (index == start + offset) return true;
     }
@@ -99,12 +104,14 @@ void Samples::add(const sensor::RgbdFrame& frame) {
   const auto index = static_cast<std::size_t>(frame.index);
   if (frame.depth.empty() || frame.gray.empty()) return;
 
+  // Groups of frames, spread over the recording.
   if (wants_sample(index)) {
     Sample sample{index, frame.stamp, frame.gray.clone(), thinned(frame.depth, step_)};
     const std::lock_guard<std::mutex> lock(mutex_);
     samples_.push_back(std::move(sample));
   }
 
+  // Dense stretches, for motion between frames.
   if (wants_thumbnail(index)) {
     const cv::Size size(kThumbnailWidth, std::max(1, kThumbnailWidth * frame.gray.rows / frame.gray.cols));
     Thumbnail thumbnail{index, frame.stamp, frame.depth_stamp, {}, inverse_thumbnail(frame.depth, size)};

@@ -31,13 +31,15 @@ struct Motion {
   Vector3d camera_turn;
 };
 
-/// Motions that turn enough to tell directions, between poses that are 1, 2, 4, 8 ... apart.
+/// Motions that turn enough to determine directions, between poses that are 1, 2, 4, 8 ... apart.
 std::vector<Motion> turning_motions(const std::vector<MatchedPose>& poses) {
+  // Long trajectories are thinned
   constexpr std::size_t kMostPoses = 1000;
   constexpr double kLeastTurn_rad = 5.0 * kDegree;
   constexpr double kMostTurn_rad = 150.0 * kDegree;  // beyond, noise may turn the axis over
   const std::size_t every = (poses.size() + kMostPoses - 1) / kMostPoses;
 
+  // Doubled distances sample slow and fast turns
   std::vector<Motion> motions;
   for (std::size_t apart = every; apart < poses.size(); apart *= 2) {
     for (std::size_t i = 0; i + apart < poses.size(); i += every) {
@@ -47,6 +49,7 @@ std::vector<Motion> turning_motions(const std::vector<MatchedPose>& poses) {
       motion.body_turn = geometry::log_so3(motion.body.rotation);
       motion.camera_turn = geometry::log_so3(motion.camera.rotation);
 
+      // Small turns hardly show their axis
       const double turn_rad = motion.camera_turn.norm();
       if (turn_rad >= kLeastTurn_rad && std::max(turn_rad, motion.body_turn.norm()) <= kMostTurn_rad)
         motions.push_back(motion);
@@ -87,30 +90,36 @@ Matrix3d fit_turn(const std::vector<Motion>& motions) {
 
 /// The camera's place in the body: (R_A - I) x = R_X s t_B - t_A for all motions; s is 1 unless `scaled`.
 Vector3d fit_lever(const std::vector<Motion>& motions, const Matrix3d& turn, bool scaled) {
+  // Iteratively reweighted least squares
   Eigen::Vector4d solution(0.0, 0.0, 0.0, 1.0);
   std::vector<double> weights(motions.size(), 1.0);
   for (int round = 0; round < kRounds; ++round) {
+    // Weighted normal equations
     Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
     Eigen::Vector4d right = Eigen::Vector4d::Zero();
 
+    // Each motion gives three equations
     for (std::size_t i = 0; i < motions.size(); ++i) {
       const Vector3d step = turn * motions[i].camera.translation;
       Eigen::Matrix<double, 3, 4> rows;
-
       rows << motions[i].body.rotation - Matrix3d::Identity(), scaled ? Vector3d(-step) : Vector3d::Zero();
       const Vector3d wanted = (scaled ? Vector3d::Zero() : step) - motions[i].body.translation;
       normal += weights[i] * rows.transpose() * rows;
       right += weights[i] * rows.transpose() * wanted;
     }
 
+    // Without a scale the fourth unknown is 1
     if (!scaled) {
       normal(3, 3) = 1.0;
       right(3) = 1.0;
     }
     solution = normal.ldlt().solve(right);
 
+    // Outliers lose weight with their residual
     std::vector<double> residuals;
     residuals.reserve(motions.size());
+
+    // Distance that the lever leaves unexplained
     for (const Motion& m : motions) {
       const Vector3d x = solution.head<3>();
       residuals.push_back(
@@ -160,6 +169,7 @@ double usual_rest(const std::vector<Motion>& motions, const Matrix3d& turn) {
 
 }  // namespace
 
+/// The pose of the camera in the body, with a unit quaternion.
 core::Result<Rigid3> parse_body(const std::string& text) {
   std::vector<double> numbers;
   for (std::size_t from = 0; from <= text.size();) {
@@ -185,10 +195,12 @@ std::string body_text(const Rigid3& body_from_camera) {
 }
 
 core::Result<Rigid3> fit_body(const std::vector<MatchedPose>& poses, bool scaled) {
+  // Limits below which the pose is not observable
   constexpr std::size_t kFewest = 10;
   constexpr double kLeastSecondTurn_rad = 0.5 * kDegree;
   constexpr double kOverNoise = 5.0;
 
+  // Without turns the lever is not observable
   const std::vector<Motion> motions = turning_motions(poses);
   const char* remedy = "; if it is known, give it as --body x,y,z,qx,qy,qz,qw";
   if (motions.size() < kFewest) {
@@ -198,6 +210,7 @@ core::Result<Rigid3> fit_body(const std::vector<MatchedPose>& poses, bool scaled
         motions.size(), remedy));
   }
 
+  // Turns about two axes determine the lever
   const Matrix3d turn = fit_turn(motions);
   const double second = second_turn(motions);
   if (second < std::max(kLeastSecondTurn_rad, kOverNoise * usual_rest(motions, turn))) {
@@ -206,10 +219,10 @@ core::Result<Rigid3> fit_body(const std::vector<MatchedPose>& poses, bool scaled
         "its pose in the body is not determined{}",
         second / kDegree, remedy));
   }
-
   return Rigid3(turn, fit_lever(motions, turn, scaled));
 }
 
+/// Errors before and after the body's pose is removed.
 BodyReport body_report(const std::vector<MatchedPose>& poses, TrajectoryAlignment align,
                        const Rigid3& body_from_camera) {
   BodyReport report;
@@ -221,6 +234,7 @@ BodyReport body_report(const std::vector<MatchedPose>& poses, TrajectoryAlignmen
   return report;
 }
 
+/// Reported only if the lever or the turn explains much of the error.
 std::optional<BodyReport> notable_body(const std::vector<MatchedPose>& poses, TrajectoryAlignment align) {
   constexpr double kLever_m = 0.01;
   constexpr double kTurn_deg = 0.5;
@@ -228,6 +242,7 @@ std::optional<BodyReport> notable_body(const std::vector<MatchedPose>& poses, Tr
   const auto body = fit_body(poses, align == TrajectoryAlignment::kSim3);
   if (!body) return std::nullopt;
 
+  // A large part of the error must vanish
   const BodyReport report = body_report(poses, align, *body);
   const bool lever = report.lever_m >= kLever_m && report.ate_after_m <= kMostLeft * report.ate_before_m;
   const bool turn = report.turn_deg >= kTurn_deg &&
@@ -235,6 +250,7 @@ std::optional<BodyReport> notable_body(const std::vector<MatchedPose>& poses, Tr
   return lever || turn ? std::optional(report) : std::nullopt;
 }
 
+/// Names the lever, the turn and what removing them gains.
 std::string body_warning(const BodyReport& body) {
   return fmt::format(
       "the truth seems to hold the poses of a body, such as a marker or an IMU, in which the camera stays "

@@ -20,12 +20,12 @@ core::Result<geometry::Rigid3> parse_body(const std::string& text);
 /// is estimated with the lever. Errors (kInput): the motion does not determine it.
 core::Result<geometry::Rigid3> fit_body(const std::vector<MatchedPose>& poses, bool scaled);
 
-/// The errors with the body in and taken out.
+/// The errors before and after the body's pose is removed from the truth.
 BodyReport body_report(const std::vector<MatchedPose>& poses, TrajectoryAlignment align,
                        const geometry::Rigid3& body_from_camera);
 /// The body, where the motion determines one that explains a good part of the errors.
 std::optional<BodyReport> notable_body(const std::vector<MatchedPose>& poses, TrajectoryAlignment align);
-/// One sentence that tells a body that was found and not taken out.
+/// One sentence about a body that was found and not removed.
 std::string body_warning(const BodyReport& body);
 
 }  // namespace plumbline::evaluate

@@ -40,6 +40,7 @@ struct Truth {
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();  ///< of all of them
 };
 
+/// The samples that cameras could see; counts the others.
 SurfaceSamples visible_of(SurfaceSamples samples, std::size_t& hidden) {
   SurfaceSamples out;
   for (std::size_t i = 0; i < samples.points.size(); ++i) {
@@ -55,6 +56,7 @@ SurfaceSamples visible_of(SurfaceSamples samples, std::size_t& hidden) {
 
 core::Result<Truth> make_truth(const Reference& reference, const CloudOptions& options,
                                const core::Executor& executor, CloudReport& report) {
+  // A mesh is sampled evenly by area
   Truth truth;
   truth.shift = reference.shift;
   if (!reference.mesh.triangles.empty()) {
@@ -65,13 +67,15 @@ core::Result<Truth> make_truth(const Reference& reference, const CloudOptions& o
                                             reference.name, 1000.0 * coarsest));
     }
 
+    // A mesh must have an area
     truth.counted = sample_mesh(reference.mesh, std::max(options.mesh_spacing_m, coarsest));
     if (truth.counted.points.empty()) {
       return core::input_error(fmt::format("{}: the mesh has no area", reference.name));
     }
-  } else {
-    truth.index = std::make_unique<PointIndex>(reference.samples.points);
 
+  } else {
+    // A cloud is its own samples
+    truth.index = std::make_unique<PointIndex>(reference.samples.points);
     const Density density = evaluate::density(*truth.index, executor);
     Points normals = known_normals(reference.samples.normals, *truth.index, executor);
     truth.surface =
@@ -79,6 +83,7 @@ core::Result<Truth> make_truth(const Reference& reference, const CloudOptions& o
     truth.counted = {reference.samples.points, std::move(normals), reference.samples.visible};
   }
 
+  // Hidden surface cannot be mapped
   if (options.visible_only && !truth.counted.visible.empty()) {
     truth.counted = visible_of(std::move(truth.counted), truth.hidden);
     report.visibility_used = true;
@@ -88,6 +93,7 @@ core::Result<Truth> make_truth(const Reference& reference, const CloudOptions& o
     }
   }
 
+  // The counts say what completeness refers to
   report.reference_points = truth.counted.points.size();
   report.reference_hidden = truth.hidden;
   return truth;
@@ -98,26 +104,32 @@ core::Result<Truth> make_truth(const Reference& reference, const CloudOptions& o
 core::Result<Rigid3> start_from_trajectories(const std::vector<TrajectoryPair>& pairs,
                                              const Eigen::Vector3d& shift, const Eigen::Vector3d& true_shift,
                                              CloudReport& report) {
+  // Poses of equal time, in shifted coordinates
   std::vector<Eigen::Vector3d> source;
   std::vector<Eigen::Vector3d> target;
 
+  // Every robot's path contributes
   for (const TrajectoryPair& pair : pairs) {
     TrajectoryOptions options;
     options.align = TrajectoryAlignment::kNone;
     const auto matched = evaluate_trajectory(pair.estimate, pair.truth, options);
     if (!matched) return tl::unexpected(matched.error());
+
+    // Small coordinates keep their precision
     for (const PoseError& pose : matched->poses) {
       source.push_back(pose.estimate.translation - shift);
       target.push_back(pose.truth.translation - true_shift);
     }
   }
 
+  // Without poses the files' coordinates decide
   if (source.empty()) return Rigid3(Eigen::Matrix3d::Identity(), shift - true_shift);
   if (source.size() < 3) {
     return core::input_error(fmt::format(
         "only {} poses match the truth in time; 3 are needed to start the alignment", source.size()));
   }
 
+  // Rigid alignment of all positions
   const Rigid3 start = geometry::align_points(source, target);
   double squares = 0.0;
   for (std::size_t i = 0; i < source.size(); ++i) squares += (start * source[i] - target[i]).squaredNorm();
@@ -129,17 +141,21 @@ core::Result<Rigid3> start_from_trajectories(const std::vector<TrajectoryPair>& 
 core::Result<void> align(SurfaceSamples& cloud, const Truth& truth, const CloudOptions& options,
                          const std::vector<TrajectoryPair>& trajectories, const core::Executor& executor,
                          CloudReport& report) {
+  // Without alignment the coordinates are taken as given
   report.alignment.align = options.align;
   const bool none = options.align == CloudAlignment::kNone;
   const auto start = start_from_trajectories(none ? std::vector<TrajectoryPair>{} : trajectories, cloud.shift,
                                              truth.shift, report);
   if (!start) return tl::unexpected(start.error());
+
+  // The shifts may still differ
   if (none) {
     if (cloud.shift != truth.shift) move(*start, cloud);
     report.alignment.reference_from_cloud = *start;
     return {};
   }
 
+  // Refinement on the surfaces
   const IcpResult icp = align_icp(cloud.points, *truth.surface, *start,
                                   {options.icp_max_distance_m, options.icp_trim}, executor);
   report.alignment.reference_from_cloud = icp.reference_from_cloud;
@@ -148,12 +164,14 @@ core::Result<void> align(SurfaceSamples& cloud, const Truth& truth, const CloudO
   report.alignment.icp_overlap = icp.overlap;
   report.alignment.icp_converged = icp.converged;
 
+  // Too little overlap, too little shape, too few iterations
   report.alignment.failed = icp.overlap < 0.3;
   if (report.alignment.failed) {
     report.warnings.push_back(fmt::format(
         "alignment: only {:.0f} % of the cloud found a partner within reach; the numbers are not to be "
         "trusted{}",
         100.0 * icp.overlap, trajectories.empty() ? ", give --trajectory and --truth to start from" : ""));
+
   } else if (!icp.determined) {
     report.warnings.push_back(
         "alignment: the surfaces do not fix all directions (a single plane?); the others are left as they "
@@ -162,6 +180,7 @@ core::Result<void> align(SurfaceSamples& cloud, const Truth& truth, const CloudO
     report.warnings.push_back("alignment: ICP was still moving when it reached its last iteration");
   }
 
+  // The cloud is compared in the reference's frame
   move(icp.reference_from_cloud, cloud);
   return {};
 }
@@ -175,30 +194,36 @@ struct Distances {
 
 /// Distances from every point of `from`, visited in `order`, to `surface`.
 Distances measure(const Points& from, const Points& normals, const std::vector<std::uint32_t>& order,
+
+                  // One result per point, in the order of `from`
                   const MeasuredSurface& surface, const core::Executor& executor) {
+  // Normals are optional
   Distances out;
   out.error_m.resize(from.size());
   out.mm.resize(from.size());
-
   std::vector<float> cosines(normals.empty() ? 0 : from.size(), kNone);
+
+  // Nearby queries share their neighbours in the index
   for_chunks(executor, order.size(), kPointsAtOnce, [&](std::size_t first, std::size_t last) {
     for (std::size_t k = first; k < last; ++k) {
       const std::uint32_t i = order[k];
       const Foot foot = surface.foot(from[i].cast<double>());
       out.error_m[i] = static_cast<float>(foot.distance);
       out.mm[i] = 1000.0 * foot.distance;
+
+      // Normals are compared only close to the surface
       if (cosines.empty() || normals[i].isZero() || foot.normal.isZero()) continue;
       if (foot.distance > kConsistencyReach) continue;
       cosines[i] = static_cast<float>(std::min(1.0, std::abs(normals[i].cast<double>().dot(foot.normal))));
     }
   });
 
+  // A sum in fixed order gives the same bits
   for (const float c : cosines) {
     if (std::isnan(c)) continue;
     out.cosines += static_cast<double>(c);
     ++out.cosine_count;
   }
-
   return out;
 }
 
@@ -208,6 +233,7 @@ double share_within(const std::vector<double>& mm, double threshold_mm) {
   return static_cast<double>(near) / static_cast<double>(mm.size());
 }
 
+/// Distances, and precision, recall and F at each threshold.
 void add_scores(const std::vector<double>& cloud_mm, const std::vector<double>& reference_mm,
                 CloudReport& report) {
   report.accuracy_mm = summarize(cloud_mm);
@@ -221,7 +247,7 @@ void add_scores(const std::vector<double>& cloud_mm, const std::vector<double>& 
   }
 }
 
-/// In what order to visit the points that completeness is measured at.
+/// The order in which completeness visits its points: neighbours one after another.
 std::vector<std::uint32_t> order_in_space(const Truth& truth) {
   if (truth.index && truth.hidden == 0) return truth.index->order();
   return PointIndex(truth.counted.points).order();
@@ -229,6 +255,7 @@ std::vector<std::uint32_t> order_in_space(const Truth& truth) {
 
 void compare(const PreparedCloud& cloud, const Truth& truth, const CloudOptions& options,
              const core::Executor& executor, CloudReport& report) {
+  // Only surface distances need normals everywhere
   const PointIndex& index = *cloud.index;
   const bool own_normals = !cloud.samples->normals.empty();
   Points surface_normals = options.distance == SampleDistance::kSurface
@@ -238,27 +265,30 @@ void compare(const PreparedCloud& cloud, const Truth& truth, const CloudOptions&
   const SampledSurface cloud_surface(index, std::move(surface_normals), cloud.density.cell_m(),
                                      options.distance);
 
+  // Accuracy: from the cloud to the reference
   const Distances accuracy =
       measure(cloud.samples->points, cloud.samples->normals, index.order(), *truth.surface, executor);
 
-  // Both directions count towards consistency, if the cloud has normals of its own.
+  // Completeness: from the reference to the cloud, with normals only if the cloud has its own
   const auto order = order_in_space(truth);
   const Distances completeness = measure(truth.counted.points, own_normals ? truth.counted.normals : Points{},
                                          order, cloud_surface, executor);
   add_scores(accuracy.mm, completeness.mm, report);
 
+  // Mean of both directions
   if (own_normals && accuracy.cosine_count > 0 && completeness.cosine_count > 0) {
     report.normal_consistency = 0.5 * (accuracy.cosines / static_cast<double>(accuracy.cosine_count) +
                                        completeness.cosines / static_cast<double>(completeness.cosine_count));
   }
 
+  // Errors by point, for coloured clouds
   for (std::size_t i = 0; i < cloud.source.size(); ++i) report.error_m[cloud.source[i]] = accuracy.error_m[i];
   report.reference_samples = truth.counted.points;
   report.reference_normals = truth.counted.normals;
   report.reference_error_m = completeness.error_m;
 }
 
-/// Warns if the cloud lies elsewhere, because its numbers then say nothing about the map.
+/// Warns if cloud and reference are apart, because the numbers then say nothing about the map.
 void warn_when_apart(const CloudOptions& options, CloudReport& report) {
   constexpr double kApartMm = 100.0;
   if (report.accuracy_mm.median < kApartMm) return;
@@ -280,6 +310,7 @@ void add_shifts(const Eigen::Vector3d& shift, const Eigen::Vector3d& true_shift,
 
 }  // namespace
 
+/// The options of evaluate cloud.
 void CloudOptions::declare(core::OptionTable& table) {
   table.choice(
       "align", align, {{"none", CloudAlignment::kNone}, {"se3", CloudAlignment::kSe3}},
@@ -302,6 +333,7 @@ core::Result<CloudReport> evaluate_cloud(const SurfaceSamples& cloud, const Refe
                                          const CloudOptions& options,
                                          const std::vector<TrajectoryPair>& trajectories,
                                          const core::Executor& executor) {
+  // Frames must agree unless trajectories align them
   if (const auto ok = check(options); !ok) return tl::unexpected(ok.error());
   if (reference != nullptr) {
     if (const auto ok = check(*reference); !ok) return tl::unexpected(ok.error());
@@ -311,10 +343,13 @@ core::Result<CloudReport> evaluate_cloud(const SurfaceSamples& cloud, const Refe
                : cloud::check_one_frame("the cloud", cloud.shift, reference->name, reference->shift);
     if (!fits) return tl::unexpected(fits.error());
   }
+
+  // Points that are not finite are left out
   CloudReport report;
   auto prepared = prepare(cloud, executor, report);
   if (!prepared) return tl::unexpected(prepared.error());
 
+  // The reference, sampled and indexed
   std::optional<Truth> truth;
   if (reference != nullptr) {
     auto made = make_truth(*reference, options, executor, report);
@@ -322,25 +357,28 @@ core::Result<CloudReport> evaluate_cloud(const SurfaceSamples& cloud, const Refe
     truth = std::move(*made);
   }
 
+  // Wall thickness needs no reference
   std::vector<WallPatch> patches =
       wall_patches(*prepared->samples, prepared->density.spacing_m, options.wall, executor);
   report.wall = thickness_of(patches);
   report.planes = wall_planes(*prepared->samples, std::move(patches), options.wall.patch_m, options.planes);
-
   if (report.wall.patches == 0) {
     report.warnings.push_back("no flat patch was found that is dense enough: wall thickness is not known");
   }
 
+  // Nothing more can be measured without a reference
   if (!truth) {
     add_shifts(cloud.shift, cloud.shift, report);
     return report;
   }
 
+  // Alignment comes before all distances
   report.has_reference = true;
   report.error_m.assign(cloud.points.size(), kNone);
   if (const auto ok = align(*prepared->samples, *truth, options, trajectories, executor, report); !ok)
     return tl::unexpected(ok.error());
 
+  // A moved cloud needs a new index
   if (options.align != CloudAlignment::kNone || cloud.shift != truth->shift)
     prepared->index = std::make_unique<PointIndex>(prepared->samples->points);
   compare(*prepared, *truth, options, executor, report);

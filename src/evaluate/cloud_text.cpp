@@ -15,6 +15,7 @@ Json distances_json(const Statistics& s) {
   return {{"mean", s.mean}, {"median", s.median}, {"rmse", s.rmse}, {"p90", s.p90}, {"max", s.max}};
 }
 
+/// Alignment as JSON; trajectory and ICP only if they were used.
 Json json_of(const CloudAlignmentReport& a) {
   const Eigen::Quaterniond q = a.reference_from_cloud.quaternion();
   const Eigen::Vector3d& t = a.reference_from_cloud.translation;
@@ -32,6 +33,7 @@ Json json_of(const CloudAlignmentReport& a) {
   return out;
 }
 
+/// Null if no patch was measured.
 Json json_of(const WallThickness& w) {
   Json out = {{"rms", nullptr}, {"mean", nullptr}, {"median", nullptr}, {"p90", nullptr}};
   if (w.patches > 0)
@@ -41,6 +43,7 @@ Json json_of(const WallThickness& w) {
   return out;
 }
 
+/// One plane of the table of walls.
 Json json_of(const WallPlane& p) {
   return {{"area_m2", p.area_m2},
           {"normal", {p.normal.x(), p.normal.y(), p.normal.z()}},
@@ -73,10 +76,13 @@ std::string row(const char* name, const Statistics& s) {
 }  // namespace
 
 std::string to_json(const CloudReport& r) {
+  // Both directions, only with a reference
   Json out;
   if (r.has_reference) {
     out["accuracy_mm"] = distances_json(r.accuracy_mm);
     out["completeness_mm"] = distances_json(r.completeness_mm);
+
+    // Precision, recall and F by threshold
     for (const ThresholdScore& s : r.at) {
       out["at"][fmt::format("{:g}mm", s.threshold_mm)] = {
           {"precision", s.precision}, {"recall", s.recall}, {"f", s.f}};
@@ -84,6 +90,7 @@ std::string to_json(const CloudReport& r) {
     out["normal_consistency"] = r.normal_consistency ? Json(*r.normal_consistency) : Json(nullptr);
   }
 
+  // Walls and density of the cloud alone
   out["wall_thickness_mm"] = json_of(r.wall);
   out["planes"] = Json::array();
   for (const WallPlane& plane : r.planes) out["planes"].push_back(json_of(plane));
@@ -91,26 +98,30 @@ std::string to_json(const CloudReport& r) {
   out["points"] = r.points;
   out["points_not_finite"] = r.not_finite;
 
+  // The reference and its alignment
   if (r.has_reference) {
     out["reference_points"] = r.reference_points;
     out["reference_hidden"] = r.reference_hidden;
     out["visible_only"] = r.visibility_used;
     out["alignment"] = json_of(r.alignment);
   }
-
   out["warnings"] = r.warnings;
   return core::json_text(out);
 }
 
 std::string to_text(const CloudReport& r) {
+  // The cloud by itself
   std::string out =
       fmt::format("{} points, {:.0f} per m2, {:.2f} mm apart\n", r.points, r.density_per_m2, r.spacing_mm);
+
+  // Comparison with the reference
   if (r.has_reference) {
     out += fmt::format("{} reference points{}\n", r.reference_points,
                        r.visibility_used
                            ? fmt::format(" that cameras could see, {} others left out", r.reference_hidden)
                            : "");
 
+    // Steps of the alignment
     if (r.alignment.align == CloudAlignment::kSe3) {
       out +=
           fmt::format("aligned by {}ICP: {} iterations, {:.3f} mm RMS, overlap {:.1f} %\n",
@@ -118,19 +129,21 @@ std::string to_text(const CloudReport& r) {
                       r.alignment.icp_rmse_mm, 100.0 * r.alignment.icp_overlap);
     }
 
+    // Both directions as a table
     out += fmt::format("{:<14} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "", "mean", "median", "rmse", "p90", "max");
     out += row("accuracy", r.accuracy_mm);
     out += row("completeness", r.completeness_mm);
     out += fmt::format("{:<14} {:>9} {:>9} {:>9}\n", "", "precision", "recall", "F");
-
     for (const ThresholdScore& s : r.at) {
       out += fmt::format("{:<14} {:>9.4f} {:>9.4f} {:>9.4f}\n", fmt::format("at {:g} mm", s.threshold_mm),
                          s.precision, s.recall, s.f);
     }
 
+    // Only clouds with normals have a consistency
     if (r.normal_consistency) out += fmt::format("normal consistency {:.4f}\n", *r.normal_consistency);
   }
 
+  // Walls and warnings
   if (r.wall.patches > 0) {
     out += fmt::format(
         "wall thickness {:.2f} mm RMS, median {:.2f}, p90 {:.2f} over {} patches, {:.1f} % doubled\n",

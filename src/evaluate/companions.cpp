@@ -31,17 +31,22 @@ fs::path folder_of(const fs::path& file) {
 
 }  // namespace
 
+/// Trajectories in the folder of the cloud, with the truth in that of the reference.
 std::vector<TrajectoryFiles> find_trajectories(const fs::path& cloud, const fs::path& reference) {
+  // Folders of result and world
   const fs::path map = folder_of(cloud);
   const fs::path world = folder_of(reference);
   const std::vector<std::string> truths = subfolders_with(world, "groundtruth.txt");
 
+  // One trajectory of a robot or a fused map
   if (is_file(map / "trajectory.txt")) {
     const fs::path estimate = map / "trajectory.txt";
     if (is_file(world / "groundtruth.txt")) return {{"", estimate, world / "groundtruth.txt"}};
     if (truths.size() == 1) return {{"", estimate, world / truths.front() / "groundtruth.txt"}};
     return {};
   }
+
+  // Several robots are matched by name
   std::vector<TrajectoryFiles> pairs;
   for (const std::string& robot : subfolders_with(map / "robots", "trajectory.txt")) {
     if (!std::binary_search(truths.begin(), truths.end(), robot)) continue;
@@ -50,12 +55,14 @@ std::vector<TrajectoryFiles> find_trajectories(const fs::path& cloud, const fs::
   return pairs;
 }
 
+/// Other files of true poses in the same folder.
 std::vector<std::string> other_truths(const fs::path& truth) {
   constexpr const char* kBegin = "groundtruth";
   const std::string own = truth.filename().string();
   std::vector<std::string> names;
   if (own.rfind(kBegin, 0) != 0) return names;
 
+  // Names that begin as the given one does
   std::error_code error;
   for (fs::directory_iterator it(folder_of(truth), error), end; !error && it != end; it.increment(error)) {
     const std::string name = it->path().filename().string();

@@ -64,6 +64,7 @@ struct Step {
 /// Gauss-Newton step about the pairs' centre, lengths in units of their radius so that all directions
 /// compare.
 Step solve(const std::vector<Pair>& pairs) {
+  // Centred and scaled: rotation and translation compare
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   for (const Pair& p : pairs) center += p.point;
   center /= static_cast<double>(pairs.size());
@@ -72,6 +73,7 @@ Step solve(const std::vector<Pair>& pairs) {
   radius = std::sqrt(radius / static_cast<double>(pairs.size()));
   if (!(radius > 0.0)) return {};
 
+  // Point-to-plane residuals, linearised
   Matrix6d hessian = Matrix6d::Zero();
   Vector6d gradient = Vector6d::Zero();
   for (const Pair& p : pairs) {
@@ -81,6 +83,7 @@ Step solve(const std::vector<Pair>& pairs) {
     gradient += j * p.residual;
   }
 
+  // Eigenvalues show the directions that surfaces determine
   hessian /= static_cast<double>(pairs.size());
   gradient /= static_cast<double>(pairs.size());
   const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(hessian);
@@ -88,6 +91,7 @@ Step solve(const std::vector<Pair>& pairs) {
   Step step;
   step.determined = true;
 
+  // Undetermined directions stay as they are
   for (Eigen::Index k = 0; k < 6; ++k) {
     if (solver.eigenvalues()(k) < kLeastStiffness) {
       step.determined = false;
@@ -97,6 +101,7 @@ Step solve(const std::vector<Pair>& pairs) {
     x -= direction * (direction.dot(gradient) / solver.eigenvalues()(k));
   }
 
+  // Back to the frame of the points
   const Eigen::Matrix3d rotation = geometry::exp_so3(x.tail<3>() / radius);
   step.motion = Rigid3(rotation, center - rotation * center + x.head<3>());
   step.length_m = x.norm();
@@ -113,32 +118,36 @@ double rms_residual(const std::vector<Pair>& pairs) {
 
 IcpResult align_icp(const std::vector<Eigen::Vector3f>& cloud, const MeasuredSurface& surface,
                     const Rigid3& start, const IcpOptions& options, const core::Executor& executor) {
+  // An even subset is enough for six unknowns
   const std::size_t stride = (cloud.size() + kMostPoints - 1) / kMostPoints;
   std::vector<Eigen::Vector3d> some;
   for (std::size_t i = 0; i < cloud.size(); i += stride) some.push_back(cloud[i].cast<double>());
 
+  // The start counts if ICP cannot begin
   IcpResult result;
   result.reference_from_cloud = start;
 
+  // Pairs, trimmed; then one Gauss-Newton step
   double reach = options.max_distance_m;
   for (; result.iterations < kMostIterations; ++result.iterations) {
     std::vector<Pair> pairs = find_pairs(some, surface, result.reference_from_cloud, reach, executor);
     result.overlap = static_cast<double>(pairs.size()) / static_cast<double>(some.size());
     if (pairs.size() < 6) return result;
 
+    // The farthest pairs may have no partner
     keep_nearest(pairs, options.trim);
     result.rmse_m = rms_residual(pairs);
     const Step step = solve(pairs);
     result.reference_from_cloud = step.motion * result.reference_from_cloud;
     result.determined = step.determined;
 
+    // The reach shrinks with the median distance
     const double tighter =
         std::clamp(4.0 * pairs[pairs.size() / 2].distance, std::min(kLeastReach, reach), reach);
     result.converged = step.length_m < kStill;
     if (result.converged && tighter > 0.99 * reach) return result;
     reach = tighter;
   }
-
   return result;
 }
 

@@ -22,6 +22,8 @@ double Layers::thickness() const { return std::sqrt(spread * spread + separation
 
 Layers split_layers(std::vector<double>& heights) {
   if (heights.empty()) return {};
+
+  // Mean and spread of a single layer
   std::sort(heights.begin(), heights.end());
   const auto n = static_cast<double>(heights.size());
   double sum = 0.0;
@@ -30,16 +32,17 @@ Layers split_layers(std::vector<double>& heights) {
   double total = 0.0;  // sum of squares about the mean
   for (const double h : heights) total += (h - mean) * (h - mean);
 
+  // The best split maximises the variance between layers
   const std::size_t least = std::max<std::size_t>(2, (heights.size() + 9) / 10);
   double low_sum = 0.0;
   double best_between = -1.0;
   double best_separation = 0.0;
-
   std::size_t best_split = 0;
   for (std::size_t k = 1; k < heights.size(); ++k) {
     low_sum += heights[k - 1] - mean;
     if (k < least || heights.size() - k < least) continue;
 
+    // Otsu's criterion
     const auto low = static_cast<double>(k);
     const double separation = -low_sum / (n - low) - low_sum / low;
     const double between = low * (n - low) / n * separation * separation;
@@ -50,6 +53,7 @@ Layers split_layers(std::vector<double>& heights) {
     }
   }
 
+  // Two layers must be clearly apart
   if (best_split == 0) return {false, std::sqrt(total / n), 0.0, 0.0};  // too few for two
   const double within = std::max(0.0, total - best_between) / n;        // mean square about the layers' means
   const auto split = heights.begin() + static_cast<std::ptrdiff_t>(best_split);
@@ -57,7 +61,6 @@ Layers split_layers(std::vector<double>& heights) {
   if (best_separation > kLeastSeparation && best_separation >= 4.0 * widest) {
     return {true, std::sqrt(within), best_separation, *split};
   }
-
   return {false, std::sqrt(total / n), 0.0, 0.0};
 }
 

@@ -23,6 +23,7 @@ geometry::ScaledRigid3 align_positions(const std::vector<MatchedPose>& poses, bo
 
 }  // namespace
 
+/// The similarity that takes the estimate to the truth.
 geometry::ScaledRigid3 align_path(const std::vector<MatchedPose>& poses, TrajectoryAlignment align) {
   switch (align) {
     case TrajectoryAlignment::kNone:
@@ -49,6 +50,7 @@ ScaleReport scale_report(const std::vector<MatchedPose>& poses, double scale) {
   ScaleReport report;
   report.value = scale;
 
+  // Scale without one part each: delete-a-group jackknife
   const std::size_t parts = std::min(kParts, poses.size());
   std::vector<double> scales;
   for (std::size_t k = 0; k < parts; ++k) {
@@ -57,6 +59,7 @@ ScaleReport scale_report(const std::vector<MatchedPose>& poses, double scale) {
     scales.push_back(align_positions(poses, true, begin, end).scale);
   }
 
+  // Jackknife variance
   double mean = 0.0;
   for (const double s : scales) mean += s / static_cast<double>(parts);
   double squares = 0.0;

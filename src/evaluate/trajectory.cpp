@@ -24,6 +24,7 @@ constexpr double kDegrees = 180.0 / 3.14159265358979323846;
 /// key is that of the stamp rounded to four decimals.
 long long stamp_key(double stamp) { return std::llrint(static_cast<long double>(stamp) * 10000.0L); }
 
+/// Tolerances must be positive.
 core::Result<void> check_options(const TrajectoryOptions& options) {
   if (!(options.max_dt_s > 0.0) || !std::isfinite(options.max_dt_s)) {
     return core::usage_error(fmt::format("max_dt is {} s; it must be above 0", options.max_dt_s));
@@ -41,6 +42,7 @@ bool fits_positions(TrajectoryAlignment align) {
   return align == TrajectoryAlignment::kSe3 || align == TrajectoryAlignment::kSim3;
 }
 
+/// All poses finite, sorted by time.
 core::Result<Trajectory> checked(const char* which, const Trajectory& given) {
   if (given.empty()) return core::input_error(fmt::format("the {} trajectory has no poses", which));
   for (std::size_t i = 0; i < given.size(); ++i) {
@@ -50,6 +52,8 @@ core::Result<Trajectory> checked(const char* which, const Trajectory& given) {
           fmt::format("the {} trajectory: pose {} of {} is not finite", which, i + 1, given.size()));
     }
   }
+
+  // Writers may store poses out of order
   Trajectory sorted = given;
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const StampedPose& a, const StampedPose& b) { return a.stamp < b.stamp; });
@@ -58,10 +62,10 @@ core::Result<Trajectory> checked(const char* which, const Trajectory& given) {
 
 struct Matches {
   std::vector<MatchedPose> pairs;
-  std::size_t ambiguous = 0;  ///< poses that share a stamp, of which the truth has another number there
+  std::size_t ambiguous = 0;  ///< poses with a common stamp that the truth has more or less often
 };
 
-/// The poses of the truth at this very stamp: the first of them and how many.
+/// The poses of the truth with this stamp: the first of them and their number.
 std::pair<Trajectory::const_iterator, std::size_t> truth_at(const Trajectory& truth, double stamp) {
   constexpr double kSame = 1e-6;  // seconds since 1970 as a double are good to 2e-7
   const auto first = std::lower_bound(truth.begin(), truth.end(), stamp - kSame,
@@ -71,15 +75,17 @@ std::pair<Trajectory::const_iterator, std::size_t> truth_at(const Trajectory& tr
   return {first, static_cast<std::size_t>(last - first)};
 }
 
-/// Poses with stamps of their own get the truth interpolated; poses that share a stamp are paired with as
-/// many of the truth in the order of both files.
+/// A pose whose stamp is unique gets the interpolated truth; poses with a common stamp are paired with as
+/// many of the truth, in the order of both files.
 Matches match(const Trajectory& estimate, const Trajectory& truth, double max_dt_s) {
+  // A group of poses with one stamp
   Matches matches;
   for (std::size_t i = 0; i < estimate.size();) {
     std::size_t end = i + 1;
     while (end < estimate.size() && estimate[end].stamp == estimate[i].stamp) ++end;
     const auto [first, there] = truth_at(truth, estimate[i].stamp);
 
+    // Equal stamps match by order, if their counts agree
     if (end - i > 1 || there > 1) {
       if (there != end - i) matches.ambiguous += end - i;
       for (std::size_t k = i; k < end && there == end - i; ++k) {
@@ -87,6 +93,7 @@ Matches match(const Trajectory& estimate, const Trajectory& truth, double max_dt
         matches.pairs.push_back(
             {estimate[k].stamp, estimate[k].world_from_camera, partner.world_from_camera});
       }
+
     } else if (const auto at = geometry::pose_at(truth, estimate[i].stamp, max_dt_s)) {
       matches.pairs.push_back({estimate[i].stamp, estimate[i].world_from_camera, *at});
     }
@@ -99,20 +106,27 @@ Matches match(const Trajectory& estimate, const Trajectory& truth, double max_dt
 
 std::string too_few_message(std::size_t matched, std::size_t needed, const Trajectory& estimate,
                             const Trajectory& truth, double max_dt_s) {
+  // Time ranges help to recognise another clock
   const bool apart =
       estimate.back().stamp < truth.front().stamp || estimate.front().stamp > truth.back().stamp;
   const std::string ranges =
       fmt::format("estimate {:.4f} to {:.4f} s, truth {:.4f} to {:.4f} s", estimate.front().stamp,
                   estimate.back().stamp, truth.front().stamp, truth.back().stamp);
+
+  // Another recording, or another clock
   if (apart) {
     return fmt::format("estimate and truth do not overlap in time ({}): are they of the same recording?",
                        ranges);
   }
+
+  // Too few poses in a file
   if (estimate.size() < needed || truth.size() < needed) {
     return fmt::format("too few poses: the estimate has {}, the truth {}, and {} are needed{}",
                        estimate.size(), truth.size(), needed,
                        needed > 1 ? "; --align start or none takes one" : "");
   }
+
+  // Too few of them match
   return fmt::format(
       "only {} of {} poses have truth within {} s of their stamp, {} are needed ({}): is the truth complete, "
       "or --max-dt too small?",
@@ -158,6 +172,7 @@ core::Result<std::optional<BodyReport>> take_body_out(const TrajectoryOptions& o
   return report;
 }
 
+/// Errors of one pose after alignment.
 PoseError pose_error(const MatchedPose& m, const geometry::ScaledRigid3& truth_from_estimate) {
   PoseError e;
   e.stamp = m.stamp;
@@ -169,6 +184,7 @@ PoseError pose_error(const MatchedPose& m, const geometry::ScaledRigid3& truth_f
   return e;
 }
 
+/// ATE, orientation errors and errors along each axis.
 void add_absolute_errors(TrajectoryReport& report) {
   std::vector<double> distance;
   std::vector<double> rotation;
@@ -189,6 +205,7 @@ void add_absolute_errors(TrajectoryReport& report) {
 
 using IndexPairs = std::vector<std::pair<std::size_t, std::size_t>>;
 
+/// RPE: the estimated motion of each pair against the true one.
 RelativeError relative_error(const std::vector<PoseError>& poses, const IndexPairs& pairs) {
   std::vector<double> translation;
   std::vector<double> rotation;
@@ -238,6 +255,7 @@ IndexPairs time_pairs(const std::vector<PoseError>& poses, double seconds, doubl
   return pairs;
 }
 
+/// Stamps as integers, sorted, without duplicates.
 std::vector<long long> sorted_keys(const std::vector<double>& stamps) {
   std::vector<long long> keys;
   keys.reserve(stamps.size());
@@ -247,18 +265,24 @@ std::vector<long long> sorted_keys(const std::vector<double>& stamps) {
   return keys;
 }
 
+/// Share of the recording's frames that have a pose.
 void add_tracked_share(const Trajectory& estimate, const std::vector<long long>& frame_keys,
                        TrajectoryReport& report) {
+  // Without frames only the start is known
   if (frame_keys.empty()) {
     report.first_pose_s = std::max(0.0, estimate.front().stamp - report.truth.front().stamp);
     return;
   }
+
+  // Stamps are compared as integers
   std::vector<double> stamps;
   for (const StampedPose& pose : estimate) stamps.push_back(pose.stamp);
   const std::vector<long long> pose_keys = sorted_keys(stamps);
   std::vector<long long> tracked;
   std::set_intersection(frame_keys.begin(), frame_keys.end(), pose_keys.begin(), pose_keys.end(),
                         std::back_inserter(tracked));
+
+  // Time until tracking began
   report.frames = frame_keys.size();
   report.tracked_percent =
       100.0 * static_cast<double>(tracked.size()) / static_cast<double>(frame_keys.size());
@@ -275,20 +299,24 @@ std::string scale_warning(const ScaleReport& scale) {
 }
 
 void add_warnings(const std::vector<MatchedPose>& matches, TrajectoryReport& report) {
+  // Alignment that the positions do not determine
   if (fits_positions(report.align) && !positions_fix_rotation(matches)) {
     report.warnings.push_back(
         "the matched positions lie on one line or at one place: the alignment's rotation is not determined, "
         "and ATE says little");
   }
 
+  // Scale and lever that the truth suggests
   if (report.scale && !report.scale->doubtful) report.warnings.push_back(scale_warning(*report.scale));
   if (report.body && !report.body->removed) report.warnings.push_back(body_warning(*report.body));
 
+  // Poses that were left out
   if (2 * report.matched < report.estimated) {
     report.warnings.push_back(
         fmt::format("only {} of {} poses have truth at their stamp", report.matched, report.estimated));
   }
 
+  // Frames that were lost
   if (report.tracked_percent && *report.tracked_percent < 90.0) {
     report.warnings.push_back(
         fmt::format("only {:.1f} % of the frames have a pose: the errors are those of the "
@@ -296,6 +324,7 @@ void add_warnings(const std::vector<MatchedPose>& matches, TrajectoryReport& rep
                     *report.tracked_percent));
   }
 
+  // Poses too sparse for RPE
   if (report.rpe_second.pairs == 0) {
     report.warnings.push_back(
         fmt::format("no two matched poses are {} s apart: RPE over time is left out", report.rpe_seconds));
@@ -304,6 +333,7 @@ void add_warnings(const std::vector<MatchedPose>& matches, TrajectoryReport& rep
 
 }  // namespace
 
+/// The options of evaluate trajectory.
 void TrajectoryOptions::declare(core::OptionTable& table) {
   table.choice(
       "align", align,
@@ -327,6 +357,7 @@ void TrajectoryOptions::declare(core::OptionTable& table) {
 core::Result<TrajectoryReport> evaluate_trajectory(const Trajectory& estimate, const Trajectory& truth,
                                                    const TrajectoryOptions& options,
                                                    const std::vector<double>& frame_stamps) {
+  // Options, poses and stamps must be valid
   if (const auto ok = check_options(options); !ok) return tl::unexpected(ok.error());
   auto sorted_estimate = checked("estimated", estimate);
   if (!sorted_estimate) return tl::unexpected(sorted_estimate.error());
@@ -336,6 +367,7 @@ core::Result<TrajectoryReport> evaluate_trajectory(const Trajectory& estimate, c
     if (!std::isfinite(s)) return core::input_error("the list of frames has a stamp that is not finite");
   }
 
+  // A rotation needs three positions
   auto [matches, ambiguous] = match(*sorted_estimate, *sorted_truth, options.max_dt_s);
   const std::size_t needed = fits_positions(options.align) ? 3 : 1;
   if (matches.size() < needed) {
@@ -344,31 +376,36 @@ core::Result<TrajectoryReport> evaluate_trajectory(const Trajectory& estimate, c
         ambiguous_message(ambiguous));
   }
 
+  // The report repeats the options that matter
   TrajectoryReport report;
   report.align = options.align;
   report.rpe_frames = options.rpe_frames;
   report.rpe_seconds = options.rpe_seconds;
   report.estimated = sorted_estimate->size();
   report.matched = matches.size();
+
+  // The body's pose is removed before the alignment
   auto body = take_body_out(options, matches, *sorted_truth);
   if (!body) return tl::unexpected(body.error());
   report.body = *body;
   report.truth = std::move(*sorted_truth);
-
   const geometry::ScaledRigid3 alignment = align_path(matches, options.align);
   report.truth_from_estimate = alignment.rigid;
   if (options.align == TrajectoryAlignment::kSim3) report.scale = scale_report(matches, alignment.scale);
 
+  // Absolute errors
   for (const MatchedPose& m : matches) report.poses.push_back(pose_error(m, alignment));
   for (std::size_t i = 0; i + 1 < matches.size(); ++i) {
     report.path_m += (matches[i + 1].truth.translation - matches[i].truth.translation).norm();
   }
 
+  // Tracked share, by stamps of frames
   report.duration_s = matches.back().stamp - matches.front().stamp;
   add_absolute_errors(report);
   const std::vector<long long> frame_keys = sorted_keys(frame_stamps);
   add_tracked_share(*sorted_estimate, frame_keys, report);
 
+  // Relative errors over frames and over time
   report.rpe_frame = relative_error(
       report.poses, frame_pairs(report.poses, frame_keys, static_cast<std::size_t>(options.rpe_frames)));
   report.rpe_second =

@@ -17,6 +17,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+/// The name of the option's value.
 const char* name_of(TrajectoryAlignment align) {
   switch (align) {
     case TrajectoryAlignment::kNone:
@@ -50,6 +51,7 @@ Json json_of(const geometry::Rigid3& t) {
           {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
 }
 
+/// The pose of the camera in the body, and what it explains.
 Json json_of(const BodyReport& body) {
   Json out = json_of(body.body_from_camera);
   out["lever_m"] = body.lever_m;
@@ -68,6 +70,7 @@ std::string row(const std::string& name, const Statistics& s, const char* unit) 
 }
 
 Json json_of(const TrajectoryReport& r) {
+  // Errors along the axes
   Json per_axis = Json::object();
   const std::array<const char*, 3> names = {"x", "y", "z"};
   for (std::size_t k = 0; k < 3; ++k) {
@@ -75,11 +78,13 @@ Json json_of(const TrajectoryReport& r) {
     per_axis[names[k]]["bias"] = r.axis_bias_m[k];
   }
 
+  // RPE names its distance
   Json per_frame = json_of(r.rpe_frame);
   per_frame["frames"] = r.rpe_frames;
   Json per_second = json_of(r.rpe_second);
   per_second["seconds"] = r.rpe_seconds;
 
+  // Accuracy
   Json out;
   out["ate_m"] = json_of(r.ate_m);
   out["rotation_deg"] = json_of(r.rotation_deg);
@@ -88,12 +93,14 @@ Json json_of(const TrajectoryReport& r) {
   out["poses"] = r.estimated;
   out["matched"] = r.matched;
 
+  // Tracking and path
   if (r.frames) out["frames"] = *r.frames;
   out["tracked_percent"] = r.tracked_percent ? Json(*r.tracked_percent) : Json(nullptr);
   out["first_pose_s"] = r.first_pose_s ? Json(*r.first_pose_s) : Json(nullptr);
   out["path_m"] = r.path_m;
   out["duration_s"] = r.duration_s;
 
+  // Alignment and the body's pose
   out["alignment"] = json_of(r.truth_from_estimate);
   out["alignment"]["type"] = name_of(r.align);
   if (r.scale) {
@@ -103,6 +110,7 @@ Json json_of(const TrajectoryReport& r) {
   if (r.body) out["body"] = json_of(*r.body);
   out["warnings"] = r.warnings;
 
+  // Components beside the main map
   for (const ComponentReport& c : r.components) {
     out["components"].push_back({{"name", c.name},
                                  {"poses", c.poses},
@@ -115,6 +123,7 @@ Json json_of(const TrajectoryReport& r) {
 }  // namespace
 
 core::Result<std::vector<double>> read_frame_stamps(const std::filesystem::path& list) {
+  // Git LFS stores pointers instead of files
   std::ifstream in(list);
   if (!in) return core::input_error(fmt::format("{}: cannot be read", list.string()));
   if (core::is_lfs_pointer(list))
@@ -122,10 +131,13 @@ core::Result<std::vector<double>> read_frame_stamps(const std::filesystem::path&
   std::vector<double> stamps;
   std::string line;
 
+  // Stamps stand first in each line
   for (int number = 1; std::getline(in, line); ++number) {
     std::istringstream fields(line);
     std::string first;
     if (!(fields >> first) || first[0] == '#') continue;
+
+    // A bad stamp is reported with its line
     const auto stamp = core::to_number(first);
     if (!stamp || !std::isfinite(*stamp)) {
       return core::input_error(
@@ -134,6 +146,7 @@ core::Result<std::vector<double>> read_frame_stamps(const std::filesystem::path&
     stamps.push_back(*stamp);
   }
 
+  // Stamps in order; an empty list is an error
   if (stamps.empty()) return core::input_error(fmt::format("{}: lists no frames", list.string()));
   std::sort(stamps.begin(), stamps.end());
   return stamps;
@@ -141,6 +154,7 @@ core::Result<std::vector<double>> read_frame_stamps(const std::filesystem::path&
 
 std::string to_json(const TrajectoryReport& r) { return core::json_text(json_of(r)); }
 
+/// All estimates with their names, in the given order.
 std::string to_json(const std::vector<NamedReport>& reports) {
   Json estimates = Json::array();
   for (const NamedReport& named : reports) {
@@ -152,6 +166,7 @@ std::string to_json(const std::vector<NamedReport>& reports) {
 }
 
 std::string to_text(const std::vector<NamedReport>& reports) {
+  // Columns fit the longest name
   std::size_t width = 8;
   bool scaled = false;
   for (const NamedReport& named : reports) {
@@ -159,6 +174,7 @@ std::string to_text(const std::vector<NamedReport>& reports) {
     scaled = scaled || named.report.scale;
   }
 
+  // A dash where no pairs exist
   std::string out =
       fmt::format("{:<{}} {:>10} {:>10} {:>10} {:>10} {:>10} {:>9} {:>9}{}\n", "estimate", width, "ATE rmse",
                   "median", "max", "RPE/s m", "RPE/s deg", "matched", "tracked", scaled ? "     scale" : "");
@@ -178,15 +194,18 @@ std::string to_text(const std::vector<NamedReport>& reports) {
 }
 
 std::string to_text(const TrajectoryReport& r) {
+  // Matching and tracking
   std::string out = fmt::format("matched {} of {} poses, alignment {}, path {:.3f} m in {:.2f} s\n",
                                 r.matched, r.estimated, name_of(r.align), r.path_m, r.duration_s);
   if (r.tracked_percent) out += fmt::format("tracked {:.2f} % of {} frames\n", *r.tracked_percent, *r.frames);
   if (r.first_pose_s) out += fmt::format("first pose after {:.3f} s\n", *r.first_pose_s);
 
+  // Scale and lever, if they were estimated
   if (r.scale)
     out += fmt::format("scale {:.5f}, standard deviation {:.5f} (true length / estimated length)\n",
                        r.scale->value, r.scale->sigma);
 
+  // The body's pose, if it was removed
   if (r.body && r.body->removed) {
     const Eigen::Vector3d& at = r.body->body_from_camera.translation;
     out += fmt::format(
@@ -196,6 +215,7 @@ std::string to_text(const TrajectoryReport& r) {
         at.x(), at.y(), at.z(), 100.0 * r.body->lever_m, r.body->turn_deg, r.body->ate_before_m);
   }
 
+  // Absolute errors
   out += fmt::format("{:<22} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10}\n", "", "rmse", "mean", "median",
                      "min", "max", "std");
   out += row("ATE", r.ate_m, "m");
@@ -204,6 +224,7 @@ std::string to_text(const TrajectoryReport& r) {
   out += row("  along z", r.axis_m[2], "m");
   out += row("orientation", r.rotation_deg, "deg");
 
+  // Relative errors
   const std::string frames = r.rpe_frames == 1 ? "frame" : fmt::format("{} frames", r.rpe_frames);
   const std::string seconds = r.rpe_seconds == 1.0 ? "second" : fmt::format("{} s", r.rpe_seconds);
   if (r.rpe_frame.pairs > 0) {
@@ -211,11 +232,13 @@ std::string to_text(const TrajectoryReport& r) {
     out += row("", r.rpe_frame.rotation_deg, "deg");
   }
 
+  // Seconds make recordings comparable
   if (r.rpe_second.pairs > 0) {
     out += row("RPE per " + seconds, r.rpe_second.translation_m, "m");
     out += row("", r.rpe_second.rotation_deg, "deg");
   }
 
+  // Other components are aligned by themselves
   out += fmt::format("SSE {:.6f} m^2\n", r.ate_m.sse);
   for (const ComponentReport& c : r.components) {
     const std::string share = c.percent ? fmt::format(", {:.1f} % of the frames", *c.percent) : "";

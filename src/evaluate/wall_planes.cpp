@@ -51,10 +51,12 @@ SharedPlane most_shared(const Patches& patches, double slab_m) {
 }
 
 SharedPlane fitted(const Patches& patches, const PatchIndices& own, const SharedPlane& before) {
+  // Principal axes of the patches' centres
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const std::size_t i : own) mean += patches[i].center;
   mean /= static_cast<double>(own.size());
 
+  // Scatter about their mean
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const std::size_t i : own) {
     const Eigen::Vector3d d = patches[i].center - mean;
@@ -72,12 +74,15 @@ SharedPlane fitted(const Patches& patches, const PatchIndices& own, const Shared
     normal.normalize();
   }
 
+  // The normal keeps its side
   if (normal.dot(before.normal) < 0.0) normal = -normal;
   return {normal, normal.dot(mean)};
 }
 
+/// Area, thickness and straightness of one plane, and the RMS of points near it.
 WallPlane measured(const SurfaceSamples& cloud, const Patches& own, const SharedPlane& plane, double patch_m,
                    double slab_m) {
+  // Thickness is the patches' median
   WallPlane result;
   result.normal = plane.normal;
   result.offset_m = plane.offset_m;
@@ -85,15 +90,17 @@ WallPlane measured(const SurfaceSamples& cloud, const Patches& own, const Shared
 
   // A voxel grid cuts a plane into more pieces if the plane is oblique to it.
   result.area_m2 = static_cast<double>(own.size()) * patch_m * patch_m / plane.normal.lpNorm<1>();
+
+  // Straightness: patches against the plane
   double sum = 0.0;
   for (const WallPatch& patch : own) {
     const double h = plane.normal.dot(patch.center) - plane.offset_m;
     sum += h * h;
   }
-
   result.straightness_mm = 1000.0 * std::sqrt(sum / static_cast<double>(own.size()));
-  sum = 0.0;
 
+  // RMS of points that face the same way
+  sum = 0.0;
   const Eigen::Vector3f facing = plane.normal.cast<float>();
   for (std::size_t i = 0; i < cloud.points.size(); ++i) {
     const double h = plane.normal.dot(cloud.points[i].cast<double>()) - plane.offset_m;
@@ -103,6 +110,7 @@ WallPlane measured(const SurfaceSamples& cloud, const Patches& own, const Shared
     ++result.points;
   }
 
+  // Without points it stays unknown
   if (result.points > 0) result.slab_rms_mm = 1000.0 * std::sqrt(sum / static_cast<double>(result.points));
   return result;
 }
@@ -117,10 +125,13 @@ void WallPlanesOptions::declare(core::OptionTable& table) {
 
 std::vector<WallPlane> wall_planes(const SurfaceSamples& cloud, std::vector<WallPatch> patches,
                                    double patch_m, const WallPlanesOptions& options) {
+  // The plane with most patches comes first
   std::vector<WallPlane> planes;
   while (static_cast<int>(planes.size()) < options.planes && patches.size() >= kFewestPatches) {
     SharedPlane plane = most_shared(patches, options.slab_m);
     PatchIndices own = members(patches, plane, options.slab_m);
+
+    // Plane and members are refined in turn
     for (int pass = 0; pass < kPasses && own.size() >= kFewestPatches; ++pass) {
       plane = fitted(patches, own, plane);
       PatchIndices again = members(patches, plane, options.slab_m);
@@ -130,6 +141,7 @@ std::vector<WallPlane> wall_planes(const SurfaceSamples& cloud, std::vector<Wall
     }
     if (own.size() < kFewestPatches) break;
 
+    // Patches of this plane are not used again
     Patches of_plane;
     Patches rest;
     std::size_t next = 0;
@@ -143,6 +155,7 @@ std::vector<WallPlane> wall_planes(const SurfaceSamples& cloud, std::vector<Wall
     patches = std::move(rest);
   }
 
+  // The largest wall comes first
   std::stable_sort(planes.begin(), planes.end(),
                    [](const WallPlane& a, const WallPlane& b) { return a.area_m2 > b.area_m2; });
   return planes;

@@ -42,11 +42,13 @@ struct LocalPlane {
 
 /// Least squares for one layer, or for two parallel ones with a common normal; goes through the fuller one.
 LocalPlane fitted(const Points& points, const PointIndices& some, const LocalPlane& before) {
+  // Both layers share a normal
   std::vector<double> heights;
   for (const std::uint32_t i : some) heights.push_back(before.height(points[i]));
   const Layers layers = split_layers(heights);
   const double border = layers.two ? layers.border : std::numeric_limits<double>::infinity();
 
+  // Each layer has its own mean
   std::array<Eigen::Vector3d, 2> mean = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
   std::array<double, 2> count = {0.0, 0.0};
   const auto layer = [&](std::uint32_t i) { return before.height(points[i]) < border ? std::size_t{0} : 1; };
@@ -54,14 +56,16 @@ LocalPlane fitted(const Points& points, const PointIndices& some, const LocalPla
     mean[layer(i)] += points[i].cast<double>();
     count[layer(i)] += 1.0;
   }
-
   for (std::size_t k = 0; k < 2; ++k) mean[k] /= std::max(count[k], 1.0);
+
+  // Scatter about the layers' means
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const std::uint32_t i : some) {
     const Eigen::Vector3d d = points[i].cast<double>() - mean[layer(i)];
     scatter += d * d.transpose();
   }
 
+  // The fuller layer gives the position
   Eigen::Vector3d normal = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvectors().col(0);
   if (normal.dot(before.normal) < 0.0) normal = -normal;
   return {normal, count[0] > count[1] ? mean[0] : mean[1]};
@@ -79,10 +83,13 @@ PointIndices within(const Points& points, const PointIndices& some, const LocalP
 std::optional<LocalPlane> main_plane(const Points& points, const PointIndices& voxel, double flatness_m,
                                      core::SplitMix draw) {
   constexpr int kTrials = 80;
+
+  // At most 400 points
   PointIndices some;
   const std::size_t stride = (voxel.size() + 399) / 400;
   for (std::size_t i = 0; i < voxel.size(); i += stride) some.push_back(voxel[i]);
 
+  // Planes through three random points
   double best_cost = static_cast<double>(some.size()) * flatness_m * flatness_m;
   std::optional<LocalPlane> best;
   for (int trial = 0; trial < kTrials; ++trial) {
@@ -94,21 +101,24 @@ std::optional<LocalPlane> main_plane(const Points& points, const PointIndices& v
     if (area < flatness_m * flatness_m) continue;  // too small a triangle to hold a plane
 
     const LocalPlane plane{normal / area, a};
+
+    // Truncated squares: MSAC's cost
     double cost = 0.0;
     for (const std::uint32_t i : some) {
       const double h = plane.height(points[i]);
       cost += std::min(h * h, flatness_m * flatness_m);
     }
 
+    // The plane with the least cost
     if (cost < best_cost) {
       best_cost = cost;
       best = plane;
     }
   }
-
   return best;
 }
 
+/// Points by cubic cell; huge coordinates are clamped.
 Voxels voxels_of(const Points& points, double edge_m) {
   Voxels voxels;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -121,6 +131,7 @@ Voxels voxels_of(const Points& points, double edge_m) {
 
 class PatchMeasure {
  public:
+  // Cells small enough for the patch, large enough for the density.
   PatchMeasure(const SurfaceSamples& cloud, const Voxels& voxels, double spacing_m,
                const WallThicknessOptions& options)
       : cloud_(cloud), voxels_(voxels), options_(options) {
@@ -213,6 +224,7 @@ class PatchMeasure {
     return std::clamp(3.0 * 1.4826 * summarize(off).median, kLeastFitReach, options_.flatness_m);
   }
 
+  /// Heights over the plane, by cell; only points of this wall.
   [[nodiscard]] std::vector<std::vector<double>> heights_by_cell(const PointIndices& near,
                                                                  const LocalPlane& plane) const {
     const Eigen::Vector3d u = plane.normal.unitOrthogonal();
@@ -232,6 +244,7 @@ class PatchMeasure {
     return heights;
   }
 
+  /// Median thickness over cells; none if the patch is not covered.
   [[nodiscard]] std::optional<WallPatch> over_cells(std::vector<std::vector<double>> heights,
                                                     const LocalPlane& plane) const {
     std::vector<double> thickness;
@@ -260,6 +273,7 @@ class PatchMeasure {
 
 }  // namespace
 
+/// The options of wall thickness.
 void WallThicknessOptions::declare(core::OptionTable& table) {
   table.number("wall_patch", patch_m, {0.05, 5.0}, "m",
                "Edge length of the planar patches on which wall thickness is measured");
@@ -270,6 +284,7 @@ void WallThicknessOptions::declare(core::OptionTable& table) {
                "Largest deviation of a patch's main layer from a plane");
 }
 
+/// One patch at most for each occupied cube.
 std::vector<WallPatch> wall_patches(const SurfaceSamples& cloud, double spacing_m,
                                     const WallThicknessOptions& options, const core::Executor& executor) {
   const Voxels voxels = voxels_of(cloud.points, options.patch_m);
@@ -287,6 +302,7 @@ std::vector<WallPatch> wall_patches(const SurfaceSamples& cloud, double spacing_
   return patches;
 }
 
+/// Statistics over the patches.
 WallThickness thickness_of(const std::vector<WallPatch>& patches) {
   std::vector<double> thickness_mm;
   std::size_t layered = 0;

@@ -53,6 +53,7 @@ struct Choice {
   Content content = Content::kCloud;
 };
 
+/// The format with this name, and the content that it will hold.
 core::Result<Choice> chosen_by_name(const ExportRequest& request) {
   std::vector<std::string> names;
   for (const Format& format : formats()) {
@@ -116,6 +117,7 @@ std::string flag_of(std::string key) {
   return "--" + key;
 }
 
+/// Refuses options that the format does not take or that have no effect.
 core::Result<void> check_options(const ExportRequest& request, const Choice& choice) {
   const Format& format = *choice.format;
   for (const std::string& key : request.given) {
@@ -151,21 +153,27 @@ core::Result<ExportSummary> write_export(const ExportRequest& given, const core:
   const auto choice = chosen(given);
   if (!choice) return tl::unexpected(choice.error());
   if (auto fits = check_options(given, *choice); !fits) return tl::unexpected(fits.error());
+
+  // Inputs must not be overwritten
   std::vector<std::filesystem::path> inputs(given.recordings.begin(), given.recordings.end());
   inputs.push_back(given.input);
   if (auto free = maps::check_output(given.output, inputs); !free) return tl::unexpected(free.error());
 
+  // The format decides on the content
   ExportRequest request = given;
   request.content = choice->content;
   auto source = MapSource::open(request, executor, log, progress);
   if (!source) return tl::unexpected(source.error());
   auto summary = choice->format->write(*source, request.output);
   if (!summary) return summary;
+
+  // A georeference of an earlier export would mislead
   if (request.options.datum.empty() && request.options.epsg == 0) remove_georeference(request.output);
   summary->format = choice->format->name;
   return summary;
 }
 
+/// The formats as users see them.
 std::vector<FormatInfo> export_formats() {
   std::vector<FormatInfo> infos;
   for (const Format& format : formats()) {

@@ -114,6 +114,7 @@ std::string options_text() {
 
 }  // namespace
 
+/// The page about exports, from the table of formats.
 std::string exports_page() {
   std::string page = kExportsIntroduction;
   page += "| format | output | what it is | also needs |\n|---|---|---|---|\n";
@@ -123,6 +124,7 @@ std::string exports_page() {
                         format.title, format.needs);
   }
 
+  // Choice of formats, then all options
   page +=
       "\nFormats with the same ending are selected by `--what trajectory|keyframes|lines` and `--mesh`. "
       "There is no E57, because no library in Debian writes it; CloudCompare converts PLY and LAS to E57.\n";
@@ -133,6 +135,7 @@ std::string exports_page() {
       "1000` or `--ascii on`: switches take `on` or `off`.\n\n{}",
       flags_text(common_options()), options_text());
 
+  // A section for each format
   for (const FormatInfo& format : infos) {
     page += fmt::format("\n## {}\n\n{}: {}.{}\n\n{}\n", format.name, format.title, endings_text(format),
                         format.options.empty() ? "" : " Takes " + flags_text(format.options) + ".",

@@ -31,6 +31,7 @@ bool make_template(const CornerPatch& patch, Template& to) {
   float mean_y = 0.0F;
   int i = 0;
 
+  // Values, gradients and their means
   for (int v = 1; v <= kAcross; ++v) {
     const std::uint8_t* row = patch.gray.data() + v * kSide + 1;
     for (int u = 0; u < kAcross; ++u, ++i) {
@@ -38,6 +39,7 @@ bool make_template(const CornerPatch& patch, Template& to) {
       to.value[k] = row[u];
       to.dx[k] = 0.5F * static_cast<float>(row[u + 1] - row[u - 1]);
       to.dy[k] = 0.5F * static_cast<float>(row[u + kSide] - row[u - kSide]);
+
       mean += to.value[k];
       mean_x += to.dx[k];
       mean_y += to.dy[k];
@@ -49,10 +51,12 @@ bool make_template(const CornerPatch& patch, Template& to) {
   mean_y /= kCount;
   Eigen::Matrix3f normal = Eigen::Matrix3f::Zero();
 
+  // Normal equations for shift and gain, without means
   for (std::size_t k = 0; k < kCount; ++k) {
     to.value[k] -= mean;
     to.dx[k] -= mean_x;
     to.dy[k] -= mean_y;
+
     normal(0, 0) += to.dx[k] * to.dx[k];
     normal(0, 1) += to.dx[k] * to.dy[k];
     normal(0, 2) += to.dx[k] * to.value[k];
@@ -61,6 +65,7 @@ bool make_template(const CornerPatch& patch, Template& to) {
     normal(2, 2) += to.value[k] * to.value[k];
   }
 
+  // Too little texture along some direction
   to.power = normal(2, 2);
   const Eigen::Matrix3f full = normal.selfadjointView<Eigen::Upper>();
   const float across = full(0, 0) * full(1, 1) - full(0, 1) * full(0, 1);
@@ -94,6 +99,7 @@ bool sample(const cv::Mat& level, const Eigen::Vector2f& at, const Eigen::Matrix
       const int x0 = static_cast<int>(x);
       const int y0 = static_cast<int>(y);
 
+      // Bilinear interpolation
       const float fx = x - static_cast<float>(x0);
       const float fy = y - static_cast<float>(y0);
       const std::uint8_t* p = origin + y0 * step + x0;
@@ -113,6 +119,8 @@ bool sample(const cv::Mat& level, const Eigen::Vector2f& at, const Eigen::Matrix
 CornerPatch cut_patch(const cv::Mat& level, int x, int y, const Eigen::Vector2f& middle) {
   CornerPatch patch;
   patch.middle = middle;
+
+  // A pixel more on each side, for the gradients
   for (int v = 0; v < kSide; ++v) {
     std::memcpy(patch.gray.data() + v * kSide, level.ptr<std::uint8_t>(y - kReach - 1 + v) + x - kReach - 1,
                 kSide);
@@ -134,15 +142,18 @@ std::optional<Eigen::Vector2f> align_patch(const CornerPatch& patch, const cv::M
   Eigen::Vector2f at = start;
   std::array<float, kCount> values;
   float gain = 1.0F;
-
   bool settled = false;
+
+  // Inverse compositional: one inverse serves all steps
   for (int i = 0; i <= kSteps; ++i) {
     float mean = 0.0F;
     if (!sample(level, at, level_from_patch, values, mean)) return std::nullopt;
 
+    // Residuals without the mean brightness
     Eigen::Vector3f slope = Eigen::Vector3f::Zero();
     float product = 0.0F;
     float power = 0.0F;
+
     for (std::size_t k = 0; k < kCount; ++k) {
       const float value = values[k] - mean;
       const float off = value - gain * sought.value[k];
@@ -151,11 +162,13 @@ std::optional<Eigen::Vector2f> align_patch(const CornerPatch& patch, const cv::M
       power += value * value;
     }
 
+    // Accepted only with high correlation
     if (settled) {
       if (product < kLeastAlike * std::sqrt(power * sought.power)) return std::nullopt;
       return at;
     }
 
+    // The step moves the patch, scaled by its gain
     const Eigen::Vector3f step = sought.inverse * slope;
     gain += step.z();
     const Eigen::Vector2f moved = level_from_patch * step.head<2>() / std::max(kLeastGain, gain);

@@ -15,7 +15,7 @@ float depth_roughness(const cv::Mat& depth, int x, int y, int reach, int step) {
   const float here = depth.at<float>(y, x);
   if (!(here > 0.0F)) return kUnknown;
 
-  // Inverse depth is affine on a plane. Opposite pixels together leave the mean apart from both slopes.
+  // Inverse depth is affine on a plane. Sums of opposite pixels give the mean without both slopes.
   float n = 0.0F, sum = 0.0F, squares = 0.0F;
 
   float wx = 0.0F, wy = 0.0F, xx = 0.0F, yy = 0.0F, xy = 0.0F;
@@ -46,6 +46,7 @@ float depth_roughness(const cv::Mat& depth, int x, int y, int reach, int step) {
   const float det = xx * yy - xy * xy;
   if (n < kFewest || !(det > 0.0F)) return kUnknown;
 
+  // Residual about the plane, relative to the sensor's noise
   const float along_x = (yy * wx - xy * wy) / det, along_y = (xx * wy - xy * wx) / det;
   const float rest = squares - sum * sum / n - along_x * wx - along_y * wy;
   const float noise = static_cast<float>(sensor::depth_sigma(static_cast<double>(here))) / here;
@@ -57,6 +58,8 @@ float roughness_limit(std::vector<float> roughness) {
   constexpr float kLeast = 0.2F;    // depth without any noise has steps of rounding
   constexpr std::size_t kFew = 30;  // fewer samples do not show the usual roughness: the model is used
   if (roughness.size() < kFew) return kRougher;
+
+  // Relative to the usual roughness in this image
   const auto middle = roughness.begin() + static_cast<std::ptrdiff_t>(roughness.size() / 2);
   std::nth_element(roughness.begin(), middle, roughness.end());
   return kRougher * std::clamp(*middle, kLeast, 2.0F);

@@ -11,6 +11,7 @@ __attribute__((target_clones("popcnt", "default"))) int hamming_distance(const D
   return sum;
 }
 
+// Compiled twice: processors with popcnt take the faster variant.
 __attribute__((target_clones("popcnt", "default"))) void hamming_distances(const Descriptor256& query,
                                                                            const Descriptor256* others,
                                                                            std::size_t count,

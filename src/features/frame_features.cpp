@@ -44,6 +44,7 @@ cv::Mat make_thumbnail_depth(const cv::Mat& depth, const cv::Size& size) {
         if (z > 0.0F) found[count++] = z;
       }
 
+      // The median, if most samples have depth
       if (count < 3) continue;
       std::sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(count));
       result.at<float>(y, x) = found[count / 2];
@@ -63,6 +64,7 @@ bool at_border(const cv::Mat& depth, const Eigen::Vector2f& pixel, float reach) 
     return u < 0 || v < 0 || u >= depth.cols || v >= depth.rows ? 0.0F : depth.at<float>(v, u);
   };
 
+  // Opposite pixels on rings around the corner
   constexpr std::array<float, 4> kRings{0.4F, 0.7F, 1.0F, 1.3F};
   constexpr float kDiagonal = 0.70710678F;
   const std::array<Eigen::Vector2f, 4> ways{
@@ -70,6 +72,7 @@ bool at_border(const cv::Mat& depth, const Eigen::Vector2f& pixel, float reach) 
       Eigen::Vector2f(-kDiagonal, kDiagonal)};
   constexpr std::size_t kPairs = 16;
 
+  // Without depth here, any depth around is a border
   const float here = at(pixel);
   if (!(here > 0.0F)) {
     for (const float ring : kRings) {
@@ -80,6 +83,7 @@ bool at_border(const cv::Mat& depth, const Eigen::Vector2f& pixel, float reach) 
     return false;
   }
 
+  // Deviations from a plane that noise does not explain
   const float tolerance = 0.01F + 4.0F * static_cast<float>(sensor::depth_sigma(here)) / here;
   std::size_t seen = 0;
 
@@ -93,6 +97,7 @@ bool at_border(const cv::Mat& depth, const Eigen::Vector2f& pixel, float reach) 
     }
   }
 
+  // Depth is missing on too many sides
   return 4 * seen < 3 * kPairs;
 }
 
@@ -101,8 +106,9 @@ void empty_patches_at_borders(const cv::Mat& depth, const OrbExtractor& extracto
   if (depth.empty()) return;
   constexpr int kSteps = 5;  // from the corner to the end of the tested range
   std::vector<float> roughness;
-
   std::vector<std::size_t> asked;
+
+  // Patches that span a depth border
   for (std::size_t i = 0; i < orb.points.size(); ++i) {
     const Eigen::Vector2f& pixel = orb.points[i].pixel;
     const auto reach = static_cast<float>(CornerPatch::kReach) * extractor.sigma(orb.points[i].octave);
@@ -111,6 +117,7 @@ void empty_patches_at_borders(const cv::Mat& depth, const OrbExtractor& extracto
       continue;
     }
 
+    // Roughness of the depth under the patch
     const int x = std::clamp(cvRound(pixel.x()), 0, depth.cols - 1);
     const int y = std::clamp(cvRound(pixel.y()), 0, depth.rows - 1);
     if (!(depth.at<float>(y, x) > 0.0F)) continue;  // nothing is known
@@ -118,6 +125,7 @@ void empty_patches_at_borders(const cv::Mat& depth, const OrbExtractor& extracto
     asked.push_back(i);
   }
 
+  // Patches on rougher depth than usual
   const float limit = roughness_limit(roughness);
   for (std::size_t k = 0; k < asked.size(); ++k) {
     if (roughness[k] > limit) orb.patches[asked[k]].gray.fill(0);
@@ -133,9 +141,13 @@ PointGrid::PointGrid(const std::vector<PointFeature>& points, int width, int hei
     const int r = std::clamp(static_cast<int>(p.pixel.y()) / kCell, 0, rows_ - 1);
     return static_cast<std::size_t>(r * columns_ + c);
   };
+
+  // Counting sort: where each cell begins
   begin_.assign(static_cast<std::size_t>(columns_ * rows_) + 1, 0);
   for (const PointFeature& p : points) ++begin_[cell_of(p) + 1];
   for (std::size_t i = 1; i < begin_.size(); ++i) begin_[i] += begin_[i - 1];
+
+  // Points in the order of their cells
   order_.resize(points.size());
   std::vector<int> next(begin_.begin(), begin_.end() - 1);
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -151,9 +163,11 @@ void PointGrid::within(const std::vector<PointFeature>& points, float x, float y
   };
   const float radius_sq = radius * radius;
 
+  // Only cells that the circle may touch
   for (int r = cell(y - radius, rows_); r <= cell(y + radius, rows_); ++r) {
     for (int c = cell(x - radius, columns_); c <= cell(x + radius, columns_); ++c) {
       const auto k = static_cast<std::size_t>(r * columns_ + c);
+
       for (int i = begin_[k]; i < begin_[k + 1]; ++i) {
         const int index = order_[static_cast<std::size_t>(i)];
         const Eigen::Vector2f& p = points[static_cast<std::size_t>(index)].pixel;
@@ -217,6 +231,7 @@ FrameFeatures FeatureExtractor::extract(const sensor::RgbdFrame& frame) const {
   FrameFeatures result;
   if (frame.gray.empty()) return result;
 
+  // Corners with their depth and slant
   if (options_.points) {
     OrbFeatures orb = orb_.extract(frame.gray, valid_region(frame.gray));
     result.slants.reserve(orb.points.size());
@@ -226,6 +241,7 @@ FrameFeatures FeatureExtractor::extract(const sensor::RgbdFrame& frame) const {
       result.slants.push_back(found.slant);
     }
 
+    // No patch may span a depth border
     empty_patches_at_borders(frame.depth, orb_, orb);
     result.points = std::move(orb.points);
     result.descriptors = std::move(orb.descriptors);

@@ -38,6 +38,8 @@ PixelDepth without_shutter(const PixelDepth& read, const Vector6d& shutter_motio
                            const sensor::Pinhole& image) {
   if (shutter_motion.isZero(0.0)) return read;
   PixelDepth feature;
+
+  // Rows are read before or after the middle one
   const double share = read.pixel.y() / image.height - 0.5;
   feature.pixel = moved_pixel(read, -share, shutter_motion, image, feature.depth);
   return feature;
@@ -72,11 +74,14 @@ void recalibrate(FrameFeatures& features, const sensor::Recalibration& change, c
   const sensor::Pinhole& image = change.before().image();
   const Vector6d motion_before = features.shutter_motion;
   const Vector6d motion_after = change.after().camera().readout_s.value_or(0.0) * velocity;
+
+  // Back to the measurement, then with the new camera
   const auto made_anew = [&](const Eigen::Vector2f& pixel, double depth) {
     const PixelDepth seen = measurement_of({pixel.cast<double>(), depth}, motion_before, change.before());
     return feature_of(seen, motion_after, change.after());
   };
 
+  // Points, and the patches around them
   for (std::size_t i = 0; i < features.points.size(); ++i) {
     PointFeature& point = features.points[i];
     PixelDepth now = made_anew(point.pixel, static_cast<double>(point.depth));
@@ -86,6 +91,7 @@ void recalibrate(FrameFeatures& features, const sensor::Recalibration& change, c
     if (!features.patches.empty()) features.patches[i].middle = point.pixel - features.patches[i].offset;
   }
 
+  // Ends of lines, with their depth at the new delay
   for (LineFeature& line : features.lines) {
     const auto move_end = [&](Eigen::Vector2f& pixel, Eigen::Vector3d* end) {
       const PixelDepth now = made_anew(pixel, end != nullptr ? end->z() : 0.0);

@@ -22,7 +22,7 @@ struct Corner {
   int score = 0;  ///< the largest threshold at which FAST still finds it, grey values
 };
 
-/// Which cell of a grid over a width x height area a corner lies in.
+/// Cells of a grid over an area of width x height.
 class Cells {
  public:
   Cells(int width, int height)
@@ -76,21 +76,22 @@ std::vector<Corner> spread(std::vector<Corner> corners, const cv::Size& size, in
     return corners;
   }
 
+  // Corners by cell, the strongest first
   const Cells cells(size.width, size.height);
   std::vector<std::size_t> begin(cells.count() + 1, 0);
   for (const Corner& corner : corners) ++begin[cells.of(corner) + 1];
-
   for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
   std::vector<Corner> by_cell(corners.size());
   std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
   for (const Corner& corner : corners) by_cell[next[cells.of(corner)]++] = corner;
+
   const auto place = [&](std::size_t i) { return by_cell.begin() + static_cast<std::ptrdiff_t>(i); };
   for (std::size_t i = 0; i + 1 < begin.size(); ++i)
     std::sort(place(begin[i]), place(begin[i + 1]), stronger);
 
+  // Every cell gives a corner in each round
   std::vector<Corner> chosen;
   chosen.reserve(count);
-
   std::vector<Corner> round;
   for (std::size_t rank = 0; chosen.size() < count; ++rank) {
     round.clear();
@@ -99,6 +100,7 @@ std::vector<Corner> spread(std::vector<Corner> corners, const cv::Size& size, in
     }
     if (round.empty()) break;
 
+    // The last round only gives its strongest
     const std::size_t room = count - chosen.size();
     if (round.size() > room) {
       std::sort(round.begin(), round.end(), stronger);
@@ -117,8 +119,9 @@ bool on_edge(const cv::Mat& level, int x, int y, double min_corner) {
   constexpr int kTensorReach = 3;
   int xx = 0;
   int xy = 0;
-
   int yy = 0;
+
+  // Structure tensor of the gradients
   for (int v = y - kTensorReach; v <= y + kTensorReach; ++v) {
     const unsigned char* above = level.ptr<unsigned char>(v - 1);
     const unsigned char* row = level.ptr<unsigned char>(v);
@@ -133,6 +136,7 @@ bool on_edge(const cv::Mat& level, int x, int y, double min_corner) {
     }
   }
 
+  // Eigenvalues are compared without computing roots
   const double sum = static_cast<double>(xx) + yy;  // of the tensor's eigenvalues
   const double apart = static_cast<double>(xx) - yy;
   const double squared = apart * apart + 4.0 * xy * xy;  // of their difference
@@ -247,6 +251,8 @@ OrbFeatures OrbExtractor::extract(const cv::Mat& gray, const cv::Rect& region) c
 
   for (int level = 0; level < options_.levels; ++level) {
     const float scale = scale_[static_cast<std::size_t>(level)];
+
+    // Each level is made from the one before
     if (level > 0) {
       cv::Mat smaller;
       const cv::Size size(cvRound(static_cast<float>(gray.cols) / scale),
@@ -260,6 +266,7 @@ OrbFeatures OrbExtractor::extract(const cv::Mat& gray, const cv::Rect& region) c
     const cv::Rect inner = inner_region(region, image.size(), scale);
     if (inner.width < 8 || inner.height < 8) continue;
 
+    // Number in proportion to the level's width
     const int wanted = static_cast<int>(std::lround(options_.count / (scale * share_sum)));
     const std::vector<Corner> corners =
         spread(detect(image, inner, options_.fast_threshold,
@@ -267,6 +274,7 @@ OrbFeatures OrbExtractor::extract(const cv::Mat& gray, const cv::Rect& region) c
                image.size(), wanted, options_.spread);
     if (corners.empty()) continue;
 
+    // Position, orientation and patch of each corner
     std::vector<cv::KeyPoint> on_level;
     for (const Corner& c : corners) {
       const float angle = orb_orientation(image, c.x, c.y);

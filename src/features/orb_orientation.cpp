@@ -16,10 +16,13 @@ constexpr std::size_t kPatchRows = 2 * kHalfPatch + 1;
 constexpr std::size_t kPatchColumns = 32;  // the last one weighs nothing
 
 /// Weights of the patch's pixels in its first moments. u^2 + v^2 <= r (r + 1) is the same seen along x and
-/// along y; rounding the width of each row, as usual, is not, and bends orientations by several degrees.
+/// along y; rounding the width of each row, as usual, is not symmetric, and biases orientations by several
+/// degrees.
 struct Moments {
   std::array<std::int16_t, kPatchRows * kPatchColumns> x{};
   std::array<std::int16_t, kPatchRows * kPatchColumns> y{};
+
+  // Pixels outside the disk keep weight 0
   Moments() {
     for (int v = -kHalfPatch; v <= kHalfPatch; ++v) {
       for (int u = -kHalfPatch; u <= kHalfPatch; ++u) {
@@ -33,6 +36,7 @@ struct Moments {
   }
 };
 
+// Sums of x and y, weighted by intensity.
 PLUMBLINE_CLONES void weigh(const std::uint8_t* patch, const Moments& moments, int& m10, int& m01) {
   int sum_x = 0;
   int sum_y = 0;
@@ -55,6 +59,8 @@ float orb_orientation(const cv::Mat& image, int x, int y) {
                 image.ptr<std::uint8_t>(y - kHalfPatch + static_cast<int>(v)) + x - kHalfPatch,
                 kPatchColumns);
   }
+
+  // Direction of the intensity centroid
   int m10 = 0;
   int m01 = 0;
   weigh(patch.data(), moments, m10, m01);

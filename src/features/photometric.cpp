@@ -35,6 +35,7 @@ float continuous_depth(const cv::Mat& depth, int x, int y, const Surroundings& a
   const int near = around.near_px, far = around.far_px;
   float sum = 1.0F / here;
 
+  // Opposite pixels on four rings
   int count = 1;
   for (const int r : {near / 2, near, (near + far) / 2, far}) {
     for (const auto& [dx, dy] : {std::pair{1, 0}, {0, 1}, {1, 1}, {1, -1}}) {
@@ -70,6 +71,7 @@ float steepness(const cv::Mat& image, int x, int y) {
   return gx * gx + gy * gy;
 }
 
+// The steepest pixel of a cell.
 Spot steepest(const cv::Mat& image, int left, int top, int cell) {
   Spot best;
   for (int y = top; y < top + cell; ++y) {
@@ -81,6 +83,7 @@ Spot steepest(const cv::Mat& image, int left, int top, int cell) {
   return best;
 }
 
+// Bilinear interpolation.
 float interpolated(const cv::Mat& image, float x, float y) {
   const int ix = static_cast<int>(x), iy = static_cast<int>(y);
   const float sx = x - static_cast<float>(ix), sy = y - static_cast<float>(iy);
@@ -90,7 +93,7 @@ float interpolated(const cv::Mat& image, float x, float y) {
   return t + sy * (l - t);
 }
 
-/// Takes out the samples whose surroundings are rougher than most: a border is among them.
+/// Removes the samples whose surroundings are rougher than most: they contain a border.
 void keep_smooth(const std::vector<float>& roughness, std::vector<PhotometricSample>& samples) {
   const float limit = roughness_limit(roughness);
   std::size_t kept = 0;
@@ -127,9 +130,10 @@ std::vector<PhotometricSample> sample_level(const cv::Mat& image, std::size_t le
   const float per_y = static_cast<float>(depth.rows) / static_cast<float>(image.rows);
   const Surroundings around{static_cast<int>(2.5F * per_x + 0.5F), static_cast<int>(kHalo * per_x + 0.5F)};
   const int cell = kCell[level];
-
   const Eigen::Matrix3f rotation = camera_from_depth.rotation.cast<float>();
   const Eigen::Vector3f translation = camera_from_depth.translation.cast<float>();
+
+  // A cell's steepest pixel, where depth is continuous
   for (int cy = kBorder; cy + cell <= image.rows - kBorder; cy += cell) {
     for (int cx = kBorder; cx + cell <= image.cols - kBorder; cx += cell) {
       const Spot best = steepest(image, cx, cy, cell);
@@ -138,6 +142,7 @@ std::vector<PhotometricSample> sample_level(const cv::Mat& image, std::size_t le
       const float z = continuous_depth(depth, full_x, full_y, around);
       if (!(z > 0.0F)) continue;
 
+      // From the depth image to the camera
       const Eigen::Vector3f in_depth = camera.unproject(full_x, full_y, static_cast<double>(z)).cast<float>();
       const auto sample = sample_at(image, small, rotation * in_depth + translation);
       if (!sample) continue;
@@ -148,6 +153,7 @@ std::vector<PhotometricSample> sample_level(const cv::Mat& image, std::size_t le
     }
   }
 
+  // Rough depth is not reliable
   keep_smooth(roughness, samples);
   return samples;
 }

@@ -30,6 +30,7 @@ void undo_rolling_shutter(FrameFeatures& features, const sensor::Pinhole& camera
     return camera.unproject(static_cast<double>(pixel.x()), static_cast<double>(pixel.y()), z);
   };
 
+  // Points at the time of the middle row
   for (PointFeature& point : features.points) {
     const bool has_depth = point.depth > 0.0F;
     const double z = has_depth ? static_cast<double>(point.depth) : 1.0;
@@ -38,6 +39,7 @@ void undo_rolling_shutter(FrameFeatures& features, const sensor::Pinhole& camera
     if (has_depth) point.depth = static_cast<float>(p.z());
   }
 
+  // Ends of lines likewise
   for (LineFeature& line : features.lines) {
     const auto move_end = [&](Eigen::Vector2f& pixel, Eigen::Vector3d* end) {
       const float v = pixel.y();
@@ -45,6 +47,7 @@ void undo_rolling_shutter(FrameFeatures& features, const sensor::Pinhole& camera
           camera.project(moved(v, ray(pixel, end != nullptr ? end->z() : 1.0), end != nullptr)).cast<float>();
       if (end != nullptr) *end = moved(v, *end, true);
     };
+
     move_end(line.segment.start, line.line3 ? &line.line3->start : nullptr);
     move_end(line.segment.end, line.line3 ? &line.line3->end : nullptr);
   }

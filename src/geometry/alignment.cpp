@@ -44,6 +44,7 @@ ScaledRigid3 align_points_scaled(const std::vector<Eigen::Vector3d>& source,
   result.rigid = align_points(source, target);  // the best rotation does not depend on the scale
   if (source.empty()) return result;
 
+  // Centroids of both point sets.
   Eigen::Vector3d source_mean = Eigen::Vector3d::Zero();
   Eigen::Vector3d target_mean = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < source.size(); ++i) {
@@ -51,6 +52,7 @@ ScaledRigid3 align_points_scaled(const std::vector<Eigen::Vector3d>& source,
     target_mean += target[i] / static_cast<double>(source.size());
   }
 
+  // Least squares of the scale, with the rotation given.
   double common = 0.0;
   double spread = 0.0;
   for (std::size_t i = 0; i < source.size(); ++i) {

@@ -19,6 +19,7 @@ struct Plane {
   double offset;
 };
 
+/// Plane through the camera's centre and the seen segment; none: the segment is too short.
 std::optional<Plane> interpretation_plane(const LineView& view) {
   const Eigen::Vector3d normal = view.start.homogeneous().cross(view.end.homogeneous());
   const double length = normal.norm();
@@ -28,6 +29,7 @@ std::optional<Plane> interpretation_plane(const LineView& view) {
   return Plane{world, world.dot(view.camera_from_world.inverse().translation)};
 }
 
+/// Largest angle between two planes, the parallax of the line.
 double largest_angle(const std::vector<Plane>& planes) {
   double sine = 0.0;
   for (std::size_t i = 0; i < planes.size(); ++i) {
@@ -69,12 +71,14 @@ bool residuals_of(const LineView& view, const OrthonormalLine& line, Eigen::Vect
   const double norm_sq = l.head<2>().squaredNorm();
   if (!(norm_sq > 1e-16)) return false;
 
+  // Chain rule over the projected line.
   Eigen::Matrix<double, 3, 6> dl;
   dl << r, tr;
   const Eigen::Matrix<double, 3, 4> dl_dp = dl * orthonormal_jacobian(line);
   const double w = 1.0 / (std::sqrt(norm_sq) * view.sigma);
   const Eigen::Vector3d ends[2] = {view.start.homogeneous(), view.end.homogeneous()};
 
+  // Distance of each end from the line.
   for (int i = 0; i < 2; ++i) {
     const double dot = ends[i].dot(l);
     residual(i) = w * dot;
@@ -94,6 +98,7 @@ struct Fit {
   bool valid = false;
 };
 
+/// Residuals, information and gradient at a line.
 Fit evaluate(const std::vector<LineView>& views, const OrthonormalLine& line, Vector4& gradient) {
   Fit fit;
   fit.line = line;
@@ -111,6 +116,7 @@ Fit evaluate(const std::vector<LineView>& views, const OrthonormalLine& line, Ve
   return fit;
 }
 
+/// Gauss-Newton from a start, until the error no longer falls.
 Fit refine(const std::vector<LineView>& views, const OrthonormalLine& start) {
   constexpr int kIterations = 8;
   Vector4 gradient;
@@ -195,11 +201,13 @@ TriangulatedLine triangulate_local(const std::vector<LineView>& views,
     return result;
   };
 
+  // Planes must meet at a sufficient angle.
   const auto planes = interpretation_planes(views);
   if (!planes) return refused(Status::kDegenerate);
   result.angle_rad = largest_angle(*planes);
   if (result.angle_rad < options.min_angle_rad) return refused(Status::kTooLittleParallax);
 
+  // Refined in all views, judged by the residuals.
   const Fit fit = refine(views, to_orthonormal(meet(*planes)));
   if (!fit.valid) return refused(Status::kDegenerate);
   result.line = to_plucker(fit.line);
@@ -207,6 +215,7 @@ TriangulatedLine triangulate_local(const std::vector<LineView>& views,
   result.rms = redundant > 0.0 ? std::sqrt(fit.squared / redundant) : 0.0;
   if (fit.worst > options.max_residual) return refused(Status::kInconsistent);
 
+  // Both ends must be at a possible depth.
   const LineView& first = views.front();
   const double start_depth = depth_at(result.line, first, first.start);
   const double end_depth = depth_at(result.line, first, first.end);
@@ -214,16 +223,17 @@ TriangulatedLine triangulate_local(const std::vector<LineView>& views,
     if (!(z >= options.min_depth_m && z <= options.max_depth_m)) return refused(Status::kOutOfRange);
   }
 
+  // Depth of both ends must be certain enough.
   result.start = on_line(result.line, first, first.start);
   result.end = on_line(result.line, first, first.end);
   result.start_sigma = depth_sigma(fit, first, first.start);
   result.end_sigma = depth_sigma(fit, first, first.end);
-
   if (!(result.start_sigma <= options.max_relative_sigma * start_depth) ||
       !(result.end_sigma <= options.max_relative_sigma * end_depth)) {
     return refused(Status::kUncertain);
   }
 
+  // Every view must see it where it was observed.
   for (const LineView& view : views) {
     bool in_front = false;
     if (overlaps(view, result.start, result.end, options.min_depth_m, options.min_overlap, in_front))
@@ -231,6 +241,7 @@ TriangulatedLine triangulate_local(const std::vector<LineView>& views,
     return refused(in_front ? Status::kInconsistent : Status::kOutOfRange);
   }
 
+  // The direction runs from start to end.
   if (result.line.v.dot(result.end - result.start) < 0.0) result.line = {-result.line.n, -result.line.v};
   result.status = Status::kOk;
   return result;
@@ -241,12 +252,16 @@ TriangulatedLine triangulate_local(const std::vector<LineView>& views,
 TriangulatedLine triangulate_line(const std::vector<LineView>& views,
                                   const LineTriangulationOptions& options) {
   if (views.size() < 2) return {};
+
+  // World coordinates may be large, local ones are not.
   const Rigid3 world_from_first = views.front().camera_from_world.inverse();
   std::vector<LineView> local = views;
   for (LineView& view : local) view.camera_from_world = view.camera_from_world * world_from_first;
   local.front().camera_from_world = {};
   TriangulatedLine result = triangulate_local(local, options);
   if (!result.ok()) return result;
+
+  // Back into the world.
   result.line = transform(world_from_first, result.line);
   result.start = world_from_first * result.start;
   result.end = world_from_first * result.end;

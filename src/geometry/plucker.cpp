@@ -32,6 +32,8 @@ OrthonormalLine to_orthonormal(const PluckerLine& line) {
   const double n_norm = line.n.norm();
   const double v_norm = line.v.norm();
   const Eigen::Vector3d v = line.v / v_norm;
+
+  // A line through the origin has no normal.
   Eigen::Vector3d n = n_norm > 1e-12 * v_norm ? Eigen::Vector3d(line.n / n_norm) : v.unitOrthogonal();
   n = (n - v * v.dot(n)).normalized();
   result.u.col(0) = n;
@@ -57,6 +59,8 @@ OrthonormalLine update(const OrthonormalLine& line, const Eigen::Vector4d& delta
   const double s = std::sin(delta(3));
   result.w1 = line.w1 * c - line.w2 * s;
   result.w2 = line.w2 * c + line.w1 * s;
+
+  // Rounding must not build up.
   const double norm = std::hypot(result.w1, result.w2);
   result.w1 /= norm;
   result.w2 /= norm;
@@ -64,6 +68,7 @@ OrthonormalLine update(const OrthonormalLine& line, const Eigen::Vector4d& delta
 }
 
 Eigen::Matrix<double, 6, 4> orthonormal_jacobian(const OrthonormalLine& line) {
+  // Columns: rotation about u1, u2 and u3, then the angle.
   Eigen::Matrix<double, 6, 4> j = Eigen::Matrix<double, 6, 4>::Zero();
   const auto u1 = line.u.col(0);
   const auto u2 = line.u.col(1);

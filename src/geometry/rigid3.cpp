@@ -56,6 +56,8 @@ Eigen::Matrix3d exp_so3(const Eigen::Vector3d& phi) {
 Eigen::Vector3d log_so3(const Eigen::Matrix3d& rotation) {
   Eigen::Quaterniond q(rotation);
   q.normalize();
+
+  // The shorter of both rotations.
   if (q.w() < 0.0) q.coeffs() = -q.coeffs();
   const double n = q.vec().norm();
   if (n < 1e-12) return 2.0 * q.vec();

@@ -11,6 +11,8 @@ Vector6d velocity_at(const Trajectory& trajectory, double stamp) {
   const auto later = [](const StampedPose& pose, double s) { return pose.stamp < s; };
   const auto here = std::lower_bound(trajectory.begin(), trajectory.end(), stamp - 1e-4, later);
   if (here == trajectory.end()) return Vector6d::Zero();
+
+  // Central difference; one-sided at both ends of the path.
   const auto before = here == trajectory.begin() ? here : std::prev(here);
   const auto after = std::next(here) == trajectory.end() ? here : std::next(here);
   const double seconds = after->stamp - before->stamp;

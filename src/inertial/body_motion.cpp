@@ -18,7 +18,7 @@ constexpr double kLeastTurn_rad = 0.5236;  // 30 degrees, about the second axis
 constexpr double kLeastWay_m = 3.0;        // before wheels are judged
 constexpr double kMostScaleSigma = 0.01;
 constexpr double kLeastAgreeing = 0.6;
-constexpr double kGrowth = 1.25;  // of what is known, before it is all weighed again
+constexpr double kGrowth = 1.25;  // of the data, before all is estimated again
 
 std::size_t later(std::size_t count) {
   return static_cast<std::size_t>(kGrowth * static_cast<double>(count)) + 1;
@@ -64,10 +64,12 @@ Use BodyMotion::wheel_use() const {
 }
 
 void BodyMotion::observe(const CameraStep& step) {
-  constexpr double kMostSigma_m = 0.02;  // of a step that tells something
+  constexpr double kMostSigma_m = 0.02;  // of steps that are certain enough
   const double dt = step.to - step.from;
   if (!(dt > 1e-3 && dt < 0.5)) return;
   const bool told = step.sigma_m < kMostSigma_m && step.moved.translation.allFinite();
+
+  // An uncertain step ends the stretch begun.
   if (!told) stretch_ = {};
   if (told && !rates_.empty()) learn_turn(step);
   if (told && !wheels_.empty()) learn_wheels(step);
@@ -79,7 +81,7 @@ void BodyMotion::learn_turn(const CameraStep& step) {
   if (steps_.size() >= kMostSteps) return;
   steps_.push_back(step);
 
-  // Turns about each axis, without noise.
+  // Turns about each axis that exceed the tracker's noise.
   const Vector3d turn = geometry::log_so3(step.moved.rotation);
   const double angle = turn.norm();
   if (angle > kLeastRate * (step.to - step.from)) turned_ += turn * turn.transpose() / angle;
@@ -101,13 +103,14 @@ void BodyMotion::learn_wheels(const CameraStep& step) {
   if (stretch_.to != step.from) stretch_.from = step.from;
   stretch_.to = step.to;
 
-  // Whole when it is long enough, or turns enough.
+  // A stretch is complete if it is long enough or turns enough.
   const double path_m = stretch_.moved.translation.norm();
   if (path_m < kLeast_m && geometry::rotation_angle(stretch_.moved.rotation) < kLeast_rad) return;
   const CameraStep whole = std::exchange(stretch_, {});
   const auto from = wheels_at(wheels_, whole.from), to = wheels_at(wheels_, whole.to);
   if (!from || !to) return;
 
+  // Calibrated again when there is enough new data.
   stretches_.push_back({to->inverse() * *from, whole.moved});
   path_m_ += path_m;
   if (path_m_ < kLeastWay_m || stretches_.size() < std::max(kFewest, next_wheels_)) return;
@@ -124,11 +127,13 @@ tracking::SensedMotion BodyMotion::between(double earlier, double now) const {
   const double dt = now - earlier;
   if (!(dt > 0.0)) return sensed;
 
+  // Wheels measure the whole motion.
   if (wheel_use() == Use::kUsed && dt < kLongestWay_s) {
     const auto from = wheels_at(wheels_, earlier), to = wheels_at(wheels_, now);
     if (from && to) sensed.moved = camera_motion(to->inverse() * *from, *wheel_);
   }
 
+  // The gyroscope measures rotation and present turn rate.
   if (gyro_use() == Use::kUsed && dt < kLongestTurn_s) {
     sensed.turned = rates_.turned(earlier, now, *gyro_);
     const auto rate = rates_.mean(now + gyro_->delay_s - kMoment_s, now + gyro_->delay_s + kMoment_s);

@@ -42,7 +42,7 @@ Vector3d place_between(const std::vector<PathFrame>& path, std::size_t a, std::s
 std::vector<std::size_t> bridge(const TurnRates& rates, const GyroCalibration& how,
                                 std::vector<PathFrame>& path) {
   constexpr double kLongest_s = 1.0;
-  constexpr double kMostOff_rad = 0.1;  // of the turn at the other end: it is another place
+  constexpr double kMostOff_rad = 0.1;  // difference at the other end; more is another place
   std::vector<std::size_t> bridged;
   std::size_t last = path.size();
   for (std::size_t i = 0; i < path.size(); ++i) {
@@ -50,7 +50,7 @@ std::vector<std::size_t> bridge(const TurnRates& rates, const GyroCalibration& h
     const std::size_t first = std::exchange(last, i);
     if (first >= i || first + 1 == i || path[i].stamp - path[first].stamp > kLongest_s) continue;
 
-    // The gyroscope's error at the other end is shared out.
+    // The gyroscope's error at the other end is distributed.
     const auto turned = rates.turned(path[first].stamp, path[i].stamp, how);
     if (!turned) continue;
     const Matrix3d& begin = path[first].camera_from_world->rotation;
@@ -58,6 +58,7 @@ std::vector<std::size_t> bridge(const TurnRates& rates, const GyroCalibration& h
         geometry::log_so3(path[i].camera_from_world->rotation * (*turned * begin).transpose());
     if (off.norm() > kMostOff_rad) continue;
 
+    // The error grows evenly over the gap.
     for (std::size_t k = first + 1; k < i; ++k) {
       const auto so_far = rates.turned(path[first].stamp, path[k].stamp, how);
       if (!so_far) continue;
@@ -74,6 +75,8 @@ std::optional<FeltUp> felt_up(const TurnRates& rates, const GyroCalibration& how
                               const std::vector<PathFrame>& path) {
   std::vector<Vector3d> felt;
   Vector3d sum = Vector3d::Zero();
+
+  // Accelerations, turned into the world.
   for (std::size_t i = 1; i < path.size(); ++i) {
     if (!path[i].camera_from_world || path[i].stamp - path[i - 1].stamp > 1.0) continue;
     const auto force = rates.acceleration(path[i - 1].stamp + how.delay_s, path[i].stamp + how.delay_s);
@@ -83,6 +86,7 @@ std::optional<FeltUp> felt_up(const TurnRates& rates, const GyroCalibration& how
   }
   if (felt.empty() || !(sum.norm() > 0.0)) return std::nullopt;
 
+  // Up is their mean, its accuracy their spread.
   FeltUp up{sum.normalized(), 0.0};
   for (const Vector3d& f : felt) {
     const double angle = std::acos(std::clamp(f.normalized().dot(up.direction), -1.0, 1.0));

@@ -24,6 +24,7 @@ struct RatePair {
   double dt = 0.0;
 };
 
+/// Turn rates of camera and sensor, for each step that the sensor covers.
 std::vector<RatePair> rate_pairs(const TurnRates& rates, const std::vector<CameraStep>& steps,
                                  double delay_s) {
   std::vector<RatePair> pairs;
@@ -38,9 +39,12 @@ std::vector<RatePair> rate_pairs(const TurnRates& rates, const std::vector<Camer
 /// Rotation and bias with camera = R (sensor - bias), in turns; a bias is expected to be small.
 GyroCalibration fit_axes(const std::vector<RatePair>& pairs) {
   constexpr int kTurns = 8;
-  constexpr double kNoise_s = 0.5;  // what the expectation is worth, as if it had been seen so long
+  constexpr double kNoise_s = 0.5;  // weight of the expectation, as of so long a measurement
   GyroCalibration found;
+
+  // In turns, for each is estimated with the other one given.
   for (int i = 0; i < kTurns; ++i) {
+    // Rotation by Kabsch's method, without the bias.
     Matrix3d sum = Matrix3d::Zero();
     for (const RatePair& p : pairs) sum += p.dt * p.camera * (p.sensor - found.bias).transpose();
     const Eigen::JacobiSVD<Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -48,6 +52,7 @@ GyroCalibration fit_axes(const std::vector<RatePair>& pairs) {
     found.camera_from_imu =
         svd.matrixU() * Vector3d(1.0, 1.0, handed).asDiagonal() * svd.matrixV().transpose();
 
+    // The bias is the mean of the differences left.
     Vector3d off = Vector3d::Zero();
     double time = kNoise_s;
     for (const RatePair& p : pairs) {
@@ -57,6 +62,7 @@ GyroCalibration fit_axes(const std::vector<RatePair>& pairs) {
     found.bias = off / time;
   }
 
+  // Correlation of both turn rates.
   double both = 0.0, camera = 0.0, sensor = 0.0;
   for (const RatePair& p : pairs) {
     const Vector3d turned = found.camera_from_imu * (p.sensor - found.bias);
@@ -99,6 +105,8 @@ void TurnRates::add(const std::vector<dataset::ImuReading>& readings) {
   for (const dataset::ImuReading& r : readings) {
     if (!samples_.empty() && r.stamp <= samples_.back().stamp) continue;
     Sample sample{r.stamp, r.turn_rate, r.acceleration, Vector3d::Zero()};
+
+    // Trapezoidal rule, so that any mean is one difference.
     if (!samples_.empty()) {
       const Sample& last = samples_.back();
       sample.integral = last.integral + 0.5 * (r.stamp - last.stamp) * (last.rate + r.turn_rate);
@@ -111,6 +119,8 @@ std::size_t TurnRates::after(double stamp) const {
   const auto next = std::upper_bound(samples_.begin(), samples_.end(), stamp,
                                      [](double at, const Sample& s) { return at < s.stamp; });
   if (next == samples_.begin()) return 0;
+
+  // Past the end only the last stamp itself is covered.
   if (next == samples_.end()) {
     const bool exact = samples_.back().stamp == stamp && samples_.size() > 1;
     return exact ? samples_.size() - 1 : 0;
@@ -128,6 +138,8 @@ Vector3d TurnRates::integral_at(std::size_t after, double stamp) const {
 std::optional<Vector3d> TurnRates::mean(double from, double to) const {
   const std::size_t first = after(from), last = after(to);
   if (first == 0 || last == 0 || !(to > from)) return std::nullopt;
+
+  // Readings are missing in a pause.
   for (std::size_t i = first; i < last; ++i) {
     if (samples_[i].stamp - samples_[i - 1].stamp > kMostGap_s) return std::nullopt;
   }
@@ -140,6 +152,8 @@ std::optional<Matrix3d> TurnRates::turned(double from, double to, const GyroCali
   Matrix3d earlier_from_later = Matrix3d::Identity();
   const std::size_t last = after(end);
   std::size_t next = after(begin);
+
+  // Piece by piece, for rotations do not commute.
   for (double at = begin; at < end; ++next) {
     const double until = next < last ? std::min(samples_[next].stamp, end) : end;
     const std::size_t piece = std::min(next, last);
@@ -155,6 +169,8 @@ std::optional<Vector3d> TurnRates::acceleration(double from, double to) const {
   int count = 0;
   for (std::size_t i = after(from); i > 0 && i < samples_.size() && samples_[i].stamp <= to; ++i) {
     const Vector3d& felt = samples_[i].acceleration;
+
+    // Sensors without an accelerometer report zeros.
     if (!felt.allFinite() || felt.isZero(0.0)) continue;
     sum += felt;
     ++count;
@@ -180,6 +196,7 @@ std::optional<GyroCalibration> calibrate_gyro(const TurnRates& rates, const std:
 
   const double limit = std::max(kLeast, kOutlier * core::quantile(offs, 0.5, 0.0));
 
+  // Calibrated again without the worst steps.
   std::vector<CameraStep> good;
   for (std::size_t i = 0; i < steps.size(); ++i) {
     if (offs[i] <= limit) good.push_back(steps[i]);

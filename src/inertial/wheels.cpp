@@ -13,12 +13,13 @@ using geometry::Vector6d;
 
 namespace {
 
-constexpr int kUnknowns = 8;  // log of scale, log of turn scale, how the body sits (6)
+constexpr int kUnknowns = 8;  // log of scale, log of turn scale, pose of the camera on the body (6)
 using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
 using Normal = Eigen::Matrix<double, kUnknowns, kUnknowns>;
 
 constexpr double kAgrees = 16.8;  // chi-square, 6 degrees of freedom, 99 %
 
+/// The calibration after a step of the unknowns.
 WheelCalibration changed(const WheelCalibration& how, const Unknowns& by) {
   WheelCalibration result = how;
   result.scale *= std::exp(by[0]);
@@ -29,13 +30,14 @@ WheelCalibration changed(const WheelCalibration& how, const Unknowns& by) {
   return result;
 }
 
-/// Standard deviations of what is expected: wheels are right to 10 %, the body sits as told.
+/// Standard deviations beforehand: wheels are right to 10 %, the camera is mounted as given, if that is
+/// known.
 Unknowns expected_sigma(bool known) {
   const double turn = known ? 0.03 : 0.3, place = known ? 0.02 : 0.5;
   return (Unknowns() << 0.1, 0.1, turn, turn, turn, place, place, place).finished();
 }
 
-/// Difference of a stretch by wheels and by pictures, in standard deviations.
+/// Difference of a stretch by wheels and by the camera, in standard deviations.
 Vector6d difference(const WheelStretch& stretch, const WheelCalibration& how) {
   const double length = stretch.camera.translation.norm();
   const double angle = geometry::rotation_angle(stretch.camera.rotation);
@@ -51,7 +53,7 @@ struct WheelFit {
   double cost = 0.0;
 };
 
-/// Least squares with weights that slip loses, Gauss-Newton with numeric derivatives.
+/// Robust least squares, in which slip loses its weight: Gauss-Newton with numeric derivatives.
 WheelFit fit_wheels(const std::vector<WheelStretch>& stretches, const WheelCalibration& start, bool known) {
   constexpr int kRounds = 8;
   constexpr double kStep = 1e-5;
@@ -61,6 +63,7 @@ WheelFit fit_wheels(const std::vector<WheelStretch>& stretches, const WheelCalib
   Normal information = Normal::Identity();
   double worth = 1.0;
 
+  // The expectation counts as an observation.
   for (int round = 0; round < kRounds; ++round) {
     information = sigma.cwiseInverse().cwiseAbs2().asDiagonal();
     Unknowns gradient = sigma.cwiseInverse().cwiseAbs2().asDiagonal() * moved;
@@ -68,6 +71,7 @@ WheelFit fit_wheels(const std::vector<WheelStretch>& stretches, const WheelCalib
     std::size_t agreeing = 0;
     double squares = 0.0;
 
+    // Cauchy cost of each stretch.
     for (const WheelStretch& stretch : stretches) {
       const Vector6d off = difference(stretch, fit.how);
       const double square = off.squaredNorm();
@@ -87,6 +91,7 @@ WheelFit fit_wheels(const std::vector<WheelStretch>& stretches, const WheelCalib
 
     const Unknowns step = -information.ldlt().solve(gradient);
 
+    // Noise is estimated from stretches that agree.
     moved += step;
     fit.how = changed(fit.how, step);
     fit.how.agreeing =
@@ -100,7 +105,7 @@ WheelFit fit_wheels(const std::vector<WheelStretch>& stretches, const WheelCalib
 }  // namespace
 
 Rigid3 camera_motion(const Rigid3& body, const WheelCalibration& how) {
-  // Translation as seen from where the body was, for it is the way that is scaled.
+  // Translation in the first frame of the body, for the distance travelled is scaled.
   const Vector3d way = how.scale * (body.rotation.transpose() * body.translation);
   const Eigen::Matrix3d turn = geometry::exp_so3(how.turn_scale * geometry::log_so3(body.rotation));
   return how.body_from_camera.inverse() * Rigid3(turn, turn * way) * how.body_from_camera;
@@ -112,6 +117,8 @@ std::optional<Rigid3> wheels_at(const std::vector<dataset::OdometryReading>& rea
                                      [](double at, const auto& reading) { return at < reading.stamp; });
   if (next == readings.begin()) return std::nullopt;
   const auto& before = *(next - 1);
+
+  // Nothing is extrapolated past the last reading.
   if (next == readings.end())
     return before.stamp == stamp ? std::optional<Rigid3>(before.odom_from_body) : std::nullopt;
   const double gap = next->stamp - before.stamp;
@@ -121,7 +128,7 @@ std::optional<Rigid3> wheels_at(const std::vector<dataset::OdometryReading>& rea
 
 WheelCalibration calibrate_wheels(const std::vector<WheelStretch>& stretches, const Rigid3& start,
                                   bool known) {
-  // A camera whose place is not told may look any way.
+  // Without a known mounting the camera's heading may be any.
   WheelFit best;
   best.cost = 1e300;
   for (int quarter = 0; quarter < (known ? 1 : 4); ++quarter) {

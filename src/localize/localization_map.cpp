@@ -30,16 +30,20 @@ bool same(sensor::Camera a, sensor::Camera b) {
 
 }  // namespace
 
+/// Reads the finished map of a result; refuses a map that another program is still writing.
 core::Result<LocalizationMap> open_localization_map(const fs::path& input) {
   const auto place = maps::find_map(input);
   if (!place) return tl::unexpected<core::Error>(place.error());
 
+  // Places are recognised by stored features
   const fs::path& store = place->store;
   if (store.empty()) {
     return core::input_error(fmt::format(
         "{}: has no {}, in which places are found; map again with a pipeline that has a store stage",
         input.string(), maps::kStoreFile));
   }
+
+  // A map that is still growing would change under the reader
   const auto unfinished = [&] {
     return core::input_error(
         fmt::format("{}: is of a run that has not ended; let it end, or continue it with plumbline map "
@@ -48,6 +52,7 @@ core::Result<LocalizationMap> open_localization_map(const fs::path& input) {
   };
   if (is_being_written(store)) return unfinished();
 
+  // Only a complete map with keyframes can be used
   const auto run = maps::StoredRun::open_main(*place);
   if (!run) return tl::unexpected<core::Error>(run.error());
   const maps::StoredMap& stored = run->stored();

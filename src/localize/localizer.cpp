@@ -115,6 +115,7 @@ Localizer::Localizer(const LocalizationMap& map, const sensor::Camera& camera,
       readout_s_(camera.readout_s.value_or(options.tracker.readout_s)),
       places_(map, options.places, camera.color),
       tracker_(tracker_for(options.tracker, map.robots, camera.color), camera.color) {
+  // Frames come with the rolling shutter undone
   tracker_.set_shutter(0.0);
 }
 
@@ -127,12 +128,14 @@ std::vector<LocatedFrame> Localizer::process(std::size_t number, const sensor::R
   result.stamp = frame.stamp;
   if (state_ != State::kSearching) follow(frame, features, result);
 
+  // A lost track refutes the place on probation
   std::vector<LocatedFrame> certain;
   if (!result.located && state_ == State::kOnProbation) {
     refuse_waiting("the next frames did not confirm the place");
     certain.swap(waiting_);
   }
 
+  // Without a track the whole map is searched
   if (!result.located) search(frame, features, result);
   if (state_ != State::kOnProbation) {
     certain.push_back(std::move(result));
@@ -160,6 +163,7 @@ std::vector<LocatedFrame> Localizer::finish() {
   return std::exchange(waiting_, {});
 }
 
+/// Frames of a place that was not confirmed are reported as not located.
 void Localizer::refuse_waiting(const std::string& reason) {
   for (LocatedFrame& frame : waiting_) {
     frame.located = false;
@@ -222,6 +226,7 @@ void Localizer::search(const sensor::RgbdFrame& frame, const Features& features,
     return;
   }
 
+  // A place near the last pose needs no confirmation
   missed_ = 0;
   result.reason.clear();
   result.how = "place";
@@ -238,7 +243,7 @@ void Localizer::take(const tracking::TrackResult& track, LocatedFrame& result) {
   result.found = share_found(track);
   result.surface_share = track.surface_share;
 
-  // The accuracy.
+  // Accuracy: covariance of the pose, enlarged by the errors that all landmarks of the view share.
   const geometry::Matrix6d covariance =
       (track.estimate.information + 1e-3 * geometry::Matrix6d::Identity()).inverse();
   const double depth_m = depth_of(track);
@@ -249,6 +254,7 @@ void Localizer::take(const tracking::TrackResult& track, LocatedFrame& result) {
   result.sigma_rotation_rad = std::sqrt(covariance.bottomRightCorner<3, 3>().trace() +
                                         kFloor_rad * kFloor_rad + common_rad * common_rad);
 
+  // The last poses give the mean motion
   if (path_.size() > kSmoothed) path_.pop_front();
   path_.emplace_back(result.stamp, track.camera_from_world);
   move_reference(track);
@@ -284,6 +290,8 @@ std::string Localizer::doubt(const tracking::TrackResult& track) const {
 void Localizer::move_reference(const tracking::TrackResult& track) {
   constexpr double kClearly = 1.2;
   constexpr int kEnough = 20;
+
+  // Landmarks that the frame shares with each keyframe
   std::map<KeyframeId, int> common;
   const auto count = [&](const std::vector<maps::Observation>& observations) {
     for (const maps::Observation& o : observations) ++common[o.keyframe];
@@ -291,6 +299,7 @@ void Localizer::move_reference(const tracking::TrackResult& track) {
   for (const auto& match : track.points) count(map_.map.point(match.point).observations);
   for (const auto& match : track.lines) count(map_.map.line(match.line).observations);
 
+  // Hysteresis avoids switching to and fro
   KeyframeId best = track.reference;
   double most = std::max(kClearly * common[best], static_cast<double>(kEnough));
   for (const auto& [id, landmarks] : common) {
@@ -299,6 +308,7 @@ void Localizer::move_reference(const tracking::TrackResult& track) {
     most = landmarks;
   }
 
+  // With few shared landmarks the distance decides
   const bool alone = best == track.reference && common[best] < kEnough;
   if (alone) best = nearest(map_.map, track.camera_from_world, best, kClearly);
   if (best != track.reference) tracker_.map_changed(map_.map, best, track.camera_from_world);

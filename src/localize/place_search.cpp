@@ -50,6 +50,7 @@ mapping::PlaceVerification PlaceSearch::verify(const maps::Map& image, KeyframeI
                                options_.verify, options_.seed);
 }
 
+/// The place that the image shows: candidates by appearance, verified by geometry, refused if ambiguous.
 PlaceAnswer PlaceSearch::find(const sensor::RgbdFrame& frame, const Features& features) const {
   PlaceAnswer answer;
   const std::vector<places::Hit> hits = database_.query(*features).best(kHits, {});
@@ -58,18 +59,21 @@ PlaceAnswer PlaceSearch::find(const sensor::RgbdFrame& frame, const Features& fe
   int best = 0;
   int alternative = 0;
 
+  // Candidates of a place that has been tried add nothing
   for (const places::Hit& hit : hits) {
     if (hit.score < options_.min_score || static_cast<int>(tried.size()) >= options_.candidates) break;
     const auto same = [&](KeyframeId id) { return map_.map.shared(id, hit.keyframe) >= kSamePlace; };
     if (best > 0 && std::any_of(tried.begin(), tried.end(), same)) continue;
     tried.push_back(hit.keyframe);
 
+    // Geometry must confirm the similar appearance
     const mapping::PlaceVerification place = verify(image, hit.keyframe);
     if (!place.accepted) {
       if (answer.reason.empty()) answer.reason = "looks like a place, but " + place.refused;
       continue;
     }
 
+    // Two accepted poses far apart are alternatives
     const Rigid3 pose = place.query_from_match * map_.map.camera_from_world(hit.keyframe);
     if (answer.keyframe && mapping::is_near(pose, answer.camera_from_world, kSamePose_m, kSamePose_rad))
       continue;
@@ -80,6 +84,7 @@ PlaceAnswer PlaceSearch::find(const sensor::RgbdFrame& frame, const Features& fe
     answer.camera_from_world = pose;
   }
 
+  // A place that is not clearly better is refused
   if (tried.empty()) answer.reason = "looks like no place of the map";
   if (!answer.keyframe || alternative <= options_.max_alternative * best) return answer;
   answer.keyframe.reset();

@@ -17,13 +17,16 @@ core::Result<std::unique_ptr<HubBus>> open_hub_bus(const NetworkOptions& options
 
 core::Result<void> warn_of_security(const NetworkOptions& options, const std::string& danger,
                                     core::Log& log) {
+  // Without keys anyone on the interface can take part
   if (options.security.empty()) {
     if (options.interface != "lo")
       log.warning(fmt::format("no --security on interface {}: {}", options.interface, danger));
     return {};
   }
 
+  // Keys expire unnoticed during long deployments
   constexpr int kSoon = 30;  // days
+
   return core::part<BusPart>()
       .and_then([&](const BusPart* part) { return part->days_left(options.security); })
       .map([&](int days) {

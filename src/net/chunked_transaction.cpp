@@ -27,6 +27,7 @@ ChunkedTransaction::ChunkedTransaction(maps::StoreStream stream, std::int64_t af
       checksum_(hash_of(transaction_.rows.data(), transaction_.rows.size())),
       count_(static_cast<std::uint32_t>((transaction_.rows.size() + kChunkBytes - 1) / kChunkBytes)) {}
 
+/// The chunk with its place in the transaction and two hashes.
 Chunk ChunkedTransaction::chunk(std::uint32_t index) const {
   Chunk chunk;
   chunk.stream = static_cast<std::uint8_t>(stream_);

@@ -31,6 +31,7 @@ core::Result<const BusPart*> part_for(const std::vector<std::string>& robots) {
 
 }  // namespace
 
+/// A new authority with keys for the hub and for these robots.
 core::Result<void> create_keys(const fs::path& folder, const std::vector<std::string>& robots) {
   const auto keys = part_for(robots);
   if (!keys) return tl::unexpected(keys.error());
@@ -48,6 +49,7 @@ core::Result<void> create_keys(const fs::path& folder, const std::vector<std::st
   return {};
 }
 
+/// Keys for further robots; none are made if one exists.
 core::Result<void> add_keys(const fs::path& folder, const std::vector<std::string>& robots) {
   const auto keys = part_for(robots);
   if (!keys) return tl::unexpected(keys.error());

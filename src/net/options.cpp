@@ -51,6 +51,7 @@ std::string default_route() {
   return {};
 }
 
+/// The interface of the default route, else the first that is not loopback.
 std::string choose_interface() {
   const std::vector<std::string> there = interfaces();
   const auto has = [&](const std::string& name) {
@@ -70,6 +71,7 @@ bool is_robot_name(const std::string& name) {
 }
 
 core::Result<NetworkOptions> checked(NetworkOptions options, bool hub) {
+  // Numbers within DDS's and IP's ranges
   if (options.domain < 0 || options.domain > kMostDomain) {
     return core::usage_error(
         fmt::format("--domain: {} is not between 0 and {}", options.domain, kMostDomain));
@@ -78,6 +80,7 @@ core::Result<NetworkOptions> checked(NetworkOptions options, bool hub) {
     return core::usage_error(fmt::format("--port: {} is not between 1 and {}", options.port, kMostPort));
   }
 
+  // The interface must be up
   const std::vector<std::string> there = interfaces();
   if (options.interface.empty()) {
     options.interface = choose_interface();
@@ -87,10 +90,12 @@ core::Result<NetworkOptions> checked(NetworkOptions options, bool hub) {
                                          there.empty() ? "none" : fmt::format("{}", fmt::join(there, ", "))));
   }
 
+  // Names go into Cyclone's XML
   if (!made_of(options.interface, "._-@")) {
     return core::usage_error(fmt::format("--interface: '{}' cannot be used", options.interface));
   }
 
+  // TCP has no multicast: peers must be named
   const bool tcp = options.transport == Transport::kTcp;
   if (tcp && options.port == 0) options.port = kTcpPort;
   for (std::string& peer : options.peers) {
@@ -100,10 +105,10 @@ core::Result<NetworkOptions> checked(NetworkOptions options, bool hub) {
     if (tcp && peer.find(':') == std::string::npos) peer += fmt::format(":{}", options.port);
   }
 
+  // A robot cannot find a hub by TCP
   if (tcp && !hub && options.peers.empty()) {
     return core::usage_error("--transport tcp: name the hub with --peers HOST[:PORT]");
   }
-
   return options;
 }
 

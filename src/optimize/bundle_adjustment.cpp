@@ -12,6 +12,7 @@
 namespace plumbline::optimize {
 namespace {
 
+// Copies the solution to the problem; fixed poses stay.
 void write_back(const BundleState& state, BundleProblem& problem) {
   for (std::size_t i = 0; i < problem.poses.size(); ++i) {
     if (!problem.poses[i].fixed) problem.poses[i].camera_from_world = state.poses[i];
@@ -102,6 +103,7 @@ class Gate {
   std::vector<geometry::PluckerLine> lines_;
 };
 
+// Errors of the edges at this state.
 BundleFit fit_of_edges(const BundleProblem& problem, const BundleState& state) {
   FitSum sum;
   for (const BundleEdge& edge : problem.edges) {
@@ -140,12 +142,14 @@ BundleSummary adjust(BundleProblem& problem, const BundleOptions& options, const
     return summary;
   }
 
+  // Gross outliers first, with a wide gate
   BundleState state = state_of(problem);
   if (options.first_gate > 0.0) {
     const double gate = options.first_gate * options.first_gate;
     summary.before = mark_outliers(problem, state, options, gate, gate, kLeastFirstGate_px);
   }
 
+  // Outliers are judged again after every round
   for (int round = 0; round < options.rounds; ++round) {
     const RoundSummary done = solve_round(problem, options, state);
     if (round == 0) summary.initial_cost = done.initial_cost;
@@ -169,6 +173,8 @@ BundleState state_of(const BundleProblem& problem) {
   BundleState state;
   for (const BundlePose& pose : problem.poses) state.poses.push_back(pose.camera_from_world);
   state.points = problem.points;
+
+  // Lines by four unknowns instead of six
   for (const geometry::PluckerLine& line : problem.lines)
     state.lines.push_back(geometry::to_orthonormal(line));
   return state;

@@ -14,6 +14,8 @@ double BundleRound::cost(const BundleState& state) {
   double sum = 0.0;
   for (std::size_t slot = 0; slot < slots_.pose.size(); ++slot) {
     const Rigid3& pose = state.poses[at(slots_.pose[slot])];
+
+    // Points; behind the camera they cost a constant
     for (std::size_t i = equations_.points.slot_begin[slot]; i < equations_.points.slot_begin[slot + 1];
          ++i) {
       point_terms_[i].world = state.points[at(equations_.points.observations[i].landmark)];
@@ -30,6 +32,7 @@ double BundleRound::cost(const BundleState& state) {
     }
   }
 
+  // Edges; without a first pose, from the world
   for (const RoundEdge& edge : equations_.edges) {
     const Rigid3 a = edge.a < 0 ? Rigid3() : state.poses[at(slots_.pose[at(edge.a)])];
     const double e = edge_rows(edge.view, a, state.poses[at(slots_.pose[at(edge.b)])], nullptr).squaredNorm();
@@ -45,6 +48,7 @@ double BundleRound::linearise_slot(std::size_t slot, const BundleState& state) {
   Vector6d gradient = Vector6d::Zero();
   double sum = 0.0;
 
+  // Points: normal equations of pose, landmark and both
   for (std::size_t i = equations_.points.slot_begin[slot]; i < equations_.points.slot_begin[slot + 1]; ++i) {
     point_terms_[i].world = state.points[at(equations_.points.observations[i].landmark)];
     Eigen::Vector3d r;
@@ -62,9 +66,9 @@ double BundleRound::linearise_slot(std::size_t slot, const BundleState& state) {
     sum += Huber{options_.point_loss}.cost(squared);
     Matrix6d h;
     h.noalias() = weight * (j.transpose() * j);
-
     Vector6d g;
     g.noalias() = weight * (j.transpose() * r);
+
     normal += h;
     gradient += g;
     equations_.points.cross[i].noalias() = h.leftCols<3>() * pose.rotation;  // de/dP = de/drho R
@@ -73,6 +77,7 @@ double BundleRound::linearise_slot(std::size_t slot, const BundleState& state) {
     equations_.points.gradients[i].noalias() = pose.rotation.transpose() * g.head<3>();
   }
 
+  // Lines likewise
   LineDerivatives j;
   for (std::size_t i = equations_.lines.slot_begin[slot]; i < equations_.lines.slot_begin[slot + 1]; ++i) {
     const Eigen::Vector4d r = line_rows(line_views_[i], projection_, pose,
@@ -88,6 +93,7 @@ double BundleRound::linearise_slot(std::size_t slot, const BundleState& state) {
     equations_.lines.gradients[i].noalias() = weight * (j.by_line.transpose() * r);
   }
 
+  // Fixed poses are not unknowns
   if (slot < at(slots_.free)) {
     equations_.hessian[slot] = normal;
     equations_.gradient[slot] = gradient;
@@ -99,11 +105,15 @@ double BundleRound::linearise_slot(std::size_t slot, const BundleState& state) {
 double BundleRound::linearise_edge(RoundEdge& edge, const BundleState& state) {
   const Rigid3 a = edge.a < 0 ? Rigid3() : state.poses[at(slots_.pose[at(edge.a)])];
   edge.r = edge_rows(edge.view, a, state.poses[at(slots_.pose[at(edge.b)])], &edge.j);
+
+  // The robust weight scales residual and derivatives
   const double squared = edge.r.squaredNorm();
   const double root = edge.robust ? std::sqrt(Huber{options_.edge_loss}.weight(squared)) : 1.0;
   edge.r *= root;
   edge.j.by_a *= root;
   edge.j.by_b *= root;
+
+  // Only free poses are unknowns
   if (edge.a >= 0 && edge.a < slots_.free) {
     equations_.hessian[at(edge.a)].noalias() += edge.j.by_a.transpose() * edge.j.by_a;
     equations_.gradient[at(edge.a)].noalias() += edge.j.by_a.transpose() * edge.r;
@@ -119,6 +129,8 @@ double BundleRound::linearise(const BundleState& state) {
   double sum = 0.0;
   for (std::size_t slot = 0; slot < slots_.pose.size(); ++slot) sum += linearise_slot(slot, state);
   for (RoundEdge& edge : equations_.edges) sum += linearise_edge(edge, state);
+
+  // Several poses see a landmark, so it is summed last
   equations_.points.sum();
   equations_.lines.sum();
   return sum;

@@ -18,12 +18,15 @@ std::vector<int> views(const std::vector<Seen>& observations, int Seen::*landmar
 }  // namespace
 
 UsedObservations::UsedObservations(const BundleProblem& problem) {
+  // A point seen once needs its depth
   const std::vector<int> point_views =
       views(problem.point_observations, &BundlePointObservation::point, problem.points.size());
   for (std::size_t i = 0; i < problem.point_observations.size(); ++i) {
     const BundlePointObservation& o = problem.point_observations[i];
     if (!o.outlier && (point_views[at(o.point)] > 1 || o.depth > 0.0)) points.push_back(static_cast<int>(i));
   }
+
+  // A line seen once does as well
   const std::vector<int> line_views =
       views(problem.line_observations, &BundleLineObservation::line, problem.lines.size());
   for (std::size_t i = 0; i < problem.line_observations.size(); ++i) {
@@ -33,6 +36,7 @@ UsedObservations::UsedObservations(const BundleProblem& problem) {
 }
 
 PoseSlots::PoseSlots(const BundleProblem& problem) : of_pose(problem.poses.size()) {
+  // Free poses come first
   for (const bool fixed : {false, true}) {
     for (std::size_t i = 0; i < problem.poses.size(); ++i) {
       if (problem.poses[i].fixed != fixed) continue;
@@ -54,6 +58,8 @@ BundleRound::BundleRound(const BundleProblem& problem, const BundleOptions& opti
   for (const BundleEdge& edge : problem.edges)
     equations_.edges.push_back(
         {slots_.of_pose[at(edge.a)], slots_.of_pose[at(edge.b)], EdgeView(edge), true});
+
+  // Only free poses are unknowns
   equations_.hessian.resize(at(slots_.free));
   equations_.gradient.resize(at(slots_.free));
   equations_.damping.resize(at(slots_.free));
@@ -61,6 +67,8 @@ BundleRound::BundleRound(const BundleProblem& problem, const BundleOptions& opti
 
 void BundleRound::add_observations() {
   UsedObservations used(problem_);
+
+  // Observations of one pose next to each other
   const auto by_slot = [&](std::vector<int>& numbers, const auto& observations) {
     std::stable_sort(numbers.begin(), numbers.end(), [&](int a, int b) {
       return slots_.of_pose[at(observations[at(a)].pose)] < slots_.of_pose[at(observations[at(b)].pose)];
@@ -73,15 +81,14 @@ void BundleRound::add_observations() {
     equations_.points.observations.push_back({slots_.of_pose[at(o.pose)], o.point});
     point_terms_.push_back(to_term(o));
   }
-
   equations_.points.prepare(slots_.pose.size(), problem_.points.size());
+
   by_slot(used.lines, problem_.line_observations);
   for (const int i : used.lines) {
     const BundleLineObservation& o = problem_.line_observations[at(i)];
     equations_.lines.observations.push_back({slots_.of_pose[at(o.pose)], o.line});
     line_views_.emplace_back(o, problem_.camera);
   }
-
   equations_.lines.prepare(slots_.pose.size(), problem_.lines.size());
 }
 
@@ -93,6 +100,8 @@ void BundleRound::hold(const BundleState& state) {
 std::vector<BundleEdge> holding_edges(const BundleProblem& problem, const BundleState& state) {
   std::vector<BundleEdge> stays;
   std::vector<char> held(problem.poses.size(), 0);
+
+  // Once for each free pose with an edge
   for (const BundleEdge& edge : problem.edges) {
     for (const int i : {edge.a, edge.b}) {
       if (held[at(i)] != 0 || problem.poses[at(i)].fixed) continue;

@@ -29,7 +29,7 @@ void subtract_products(const double* y, int unknowns, const std::vector<Target>&
 
 }  // namespace
 
-/// Takes the landmarks that a free slot sees out of its row of the equations.
+/// Eliminates the landmarks that a free slot sees from its row of the equations.
 template <typename Family>
 void SchurComplement::eliminate(const Family& family, std::size_t slot) {
   const int row = static_cast<int>(slot);
@@ -64,6 +64,7 @@ void SchurComplement::assemble(NormalEquations& equations, double radius) {
     matrix_.setZero();
   }
 
+  // Equations of the poses, with landmarks eliminated
   for (std::size_t slot = 0; slot < at(free_); ++slot) {
     auto own = entries(static_cast<int>(slot), static_cast<int>(slot));
     own = equations.hessian[slot];
@@ -73,6 +74,7 @@ void SchurComplement::assemble(NormalEquations& equations, double radius) {
     eliminate(equations.lines, slot);
   }
 
+  // Edges couple two free poses
   for (const RoundEdge& edge : equations.edges) {
     if (edge.a < 0 || edge.a >= free_ || edge.b >= free_ || edge.a == edge.b) continue;
     const Matrix6d cross = edge.j.by_a.transpose() * edge.j.by_b;
@@ -85,6 +87,7 @@ void SchurComplement::assemble(NormalEquations& equations, double radius) {
 }
 
 bool SchurComplement::solve(NormalEquations& equations, double radius) {
+  // Landmarks are eliminated, poses solved, landmarks substituted
   equations.points.invert(radius);
   equations.lines.invert(radius);
   assemble(equations, radius);
@@ -115,8 +118,11 @@ std::vector<Matrix6d> SchurComplement::inverse_blocks(NormalEquations& equations
   equations.lines.invert_held(least_share);
   assemble(equations, 1.0);
   if (sparse_) return sparse_->inverse_blocks();
+
   const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(matrix_);
   if (llt.info() != Eigen::Success) return {};
+
+  // Columns of several poses at a time
   std::vector<Matrix6d> result(at(free_));
   for (int first = 0; first < free_; first += kAtATime) {
     const Eigen::Index rows = matrix_.rows() - 6 * first;

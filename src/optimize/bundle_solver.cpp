@@ -48,6 +48,8 @@ void BundleRound::step(const BundleState& from, BundleState& to) const {
     const auto pose = at(slots_.pose[at(i)]);
     to.poses[pose] = geometry::exp_se3(reduced_.pose_step(at(i))) * from.poses[pose];
   }
+
+  // Landmarks without observations stay
   for (std::size_t i = 0; i < equations_.points.step.size(); ++i) {
     if (equations_.points.landmark_begin[i] < equations_.points.landmark_begin[i + 1])
       to.points[i] = from.points[i] + equations_.points.step[i];
@@ -55,6 +57,8 @@ void BundleRound::step(const BundleState& from, BundleState& to) const {
   for (std::size_t i = 0; i < equations_.lines.step.size(); ++i) {
     if (equations_.lines.landmark_begin[i] == equations_.lines.landmark_begin[i + 1]) continue;
     to.lines[i] = geometry::update(from.lines[i], equations_.lines.step[i]);
+
+    // Rounding must not accumulate in the rotation
     to.lines[i].u = Eigen::Quaterniond(to.lines[i].u).normalized().toRotationMatrix();
   }
 }
@@ -79,6 +83,7 @@ const char* BundleRound::iterate(TrustRegion& region, BundleState& state, Bundle
   if (equations_.largest_gradient() <= kGradientTolerance) return "the gradient is zero";
   if (region.exhausted()) return "no step lowers the cost";
 
+  // The step and its cost
   ++summary.iterations;
   const double now = summary.final_cost;
   const double promised = reduced_.solve(equations_, region.radius()) ? model_decrease(region.radius()) : 0.0;
@@ -89,6 +94,7 @@ const char* BundleRound::iterate(TrustRegion& region, BundleState& state, Bundle
     if (tiny_step(state)) return "the step is zero";
   }
 
+  // Accepted if a share of the predicted gain is real
   const bool settled = std::abs(now - then) <= options_.tolerance * now;
   const double gain = promised > 0.0 ? (now - then) / promised : -1.0;
   if (gain > kLeastGain) {
@@ -97,6 +103,7 @@ const char* BundleRound::iterate(TrustRegion& region, BundleState& state, Bundle
   }
   if (settled) return "the cost falls no more";
 
+  // The trust region follows the gain
   if (gain > kLeastGain) {
     equations_.set_damping();
     region.accept(gain);
@@ -116,6 +123,8 @@ RoundSummary BundleRound::run(BundleState& state) {
     return summary;
   }
   summary.usable = true;
+
+  // Levenberg-Marquardt, with scales from the first equations
   equations_.set_scales();
   equations_.set_damping();
   TrustRegion region(options_.first_radius);

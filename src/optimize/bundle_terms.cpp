@@ -14,25 +14,32 @@ using geometry::Rigid3;
 using geometry::Vector6d;
 using Rows46 = Eigen::Matrix<double, 4, 6>;
 
+/// Two rows of the ends in the image, then two of their depths.
+struct LineRows {
+  Eigen::Vector4d residual = Eigen::Vector4d::Zero();
+  Rows46 by_line = Rows46::Zero();  ///< d residual / d (n_c, v_c)
+};
+
+// Distances of a segment's ends from the projected line, with derivatives.
 void image_rows(const LineView& seen, const Eigen::Matrix3d& projection, const Eigen::Vector3d& l,
-                double norm_sq, Eigen::Vector4d& residual, Rows46& by_line) {
+                double norm_sq, LineRows& rows) {
   const double w = seen.pixel_weight / std::sqrt(norm_sq);
   const Eigen::Vector3d s[2] = {seen.start.homogeneous(), seen.end.homogeneous()};
   for (int i = 0; i < 2; ++i) {
     const double dot = s[i].dot(l);
-    residual(i) = w * dot;
+    rows.residual(i) = w * dot;
     Eigen::RowVector3d by_l = w * s[i].transpose();  // quotient rule
     by_l.x() -= w * dot * l.x() / norm_sq;
     by_l.y() -= w * dot * l.y() / norm_sq;
-    by_line.block<1, 3>(i, 0).noalias() = by_l * projection;
+    rows.by_line.block<1, 3>(i, 0).noalias() = by_l * projection;
   }
 }
 
 void depth_row(const LineView& seen, const geometry::PluckerLine& line, const Eigen::Vector3d& p,
-               double weight, int row, Eigen::Vector4d& residual, Rows46& by_line) {
-  residual(row) = weight * seen.plane.dot(p.cross(line.v) - line.n);
-  by_line.block<1, 3>(row, 0) = -weight * seen.plane.transpose();
-  by_line.block<1, 3>(row, 3) = weight * seen.plane.cross(p).transpose();  // m.(p x v) = (m x p).v
+               double weight, int row, LineRows& rows) {
+  rows.residual(row) = weight * seen.plane.dot(p.cross(line.v) - line.n);
+  rows.by_line.block<1, 3>(row, 0) = -weight * seen.plane.transpose();
+  rows.by_line.block<1, 3>(row, 3) = weight * seen.plane.cross(p).transpose();  // m.(p x v) = (m x p).v
 }
 
 /// d (n, v)/d(theta, phi) for n = (w1 / w2) u1, v = u2; phi turns W: d(w1/w2)/dphi = -(1 + (w1/w2)^2).
@@ -79,33 +86,32 @@ Eigen::Vector4d line_rows(const LineView& seen, const Eigen::Matrix3d& projectio
   const geometry::PluckerLine world{orthonormal.u.col(0) * (orthonormal.w1 / w2), orthonormal.u.col(1)};
   const geometry::PluckerLine line = geometry::transform(camera_from_world, world);
 
-  Eigen::Vector4d residual = Eigen::Vector4d::Zero();
-  Rows46 by_line = Rows46::Zero();  // d residual / d (n_c, v_c)
+  LineRows rows;
   const Eigen::Vector3d l = projection * line.n;
   const double norm_sq = l.x() * l.x() + l.y() * l.y();
-  if (line.n.squaredNorm() > 1e-10 && norm_sq > 1e-6)
-    image_rows(seen, projection, l, norm_sq, residual, by_line);
+  if (line.n.squaredNorm() > 1e-10 && norm_sq > 1e-6) image_rows(seen, projection, l, norm_sq, rows);
 
   if (seen.has_depth) {
-    depth_row(seen, line, seen.start_camera, seen.start_weight, 2, residual, by_line);
-    depth_row(seen, line, seen.end_camera, seen.end_weight, 3, residual, by_line);
+    depth_row(seen, line, seen.start_camera, seen.start_weight, 2, rows);
+    depth_row(seen, line, seen.end_camera, seen.end_weight, 3, rows);
   }
 
-  if (derivatives == nullptr) return residual;
-  const auto by_n = by_line.leftCols<3>();
-  const auto by_v = by_line.rightCols<3>();
+  if (derivatives == nullptr) return rows.residual;
+  const auto by_n = rows.by_line.leftCols<3>();
+  const auto by_v = rows.by_line.rightCols<3>();
 
   // n_c and v_c by (rho, phi): [-[v]x, -[n]x; 0, -[v]x].
   const Eigen::Matrix3d v = geometry::skew(line.v);
   derivatives->by_pose.leftCols<3>().noalias() = -(by_n * v);
   derivatives->by_pose.rightCols<3>().noalias() = -(by_n * geometry::skew(line.n)) - by_v * v;
 
+  // Derivatives by the line in the world
   Rows46 by_world;  // n_c = R n_w + [t]x R v_w, v_c = R v_w
   by_world.leftCols<3>().noalias() = by_n * camera_from_world.rotation;
   by_world.rightCols<3>().noalias() =
       (by_n * geometry::skew(camera_from_world.translation) + by_v) * camera_from_world.rotation;
   derivatives->by_line.noalias() = by_world * unit_direction_jacobian(orthonormal, w2);
-  return residual;
+  return rows.residual;
 }
 
 Matrix6d square_root(const Matrix6d& information) {
@@ -122,6 +128,7 @@ Vector6d edge_rows(const EdgeView& edge, const Rigid3& a_from_world, const Rigid
   const Rigid3 b_from_a = b_from_world * a_from_world.inverse();
   const Vector6d e = geometry::log_se3(b_from_a * edge.a_from_b);
   if (derivatives != nullptr) {
+    // Inverse left Jacobian of SE(3), to first order
     Matrix6d inverse_left = Matrix6d::Identity();
     const Eigen::Matrix3d rho = geometry::skew(e.head<3>());
     const Eigen::Matrix3d phi = geometry::skew(e.tail<3>());

@@ -67,6 +67,8 @@ class Derivatives {
   void put(const Eigen::Matrix<double, kRows, kCameraUnknowns>& by_camera,
            const Eigen::Matrix<double, kRows, 3>& by_p, const RowPoint& row) const {
     if (to_ == nullptr) return;
+
+    // The readout time moves the point
     Eigen::Matrix<double, kRows, kCameraUnknowns> camera = by_camera;
     camera.col(kReadout) += by_p * row.by_readout;
     store<kCameraUnknowns>(0, camera);
@@ -96,34 +98,37 @@ class PixelCost final : public ceres::SizedCostFunction<2, kCameraUnknowns, kSte
     const RowPoint row(*pose_, share_, change, parameters[1], parameters[2]);
     if (row.p.z() < 0.05) return false;
     const Eigen::Vector2d ray(row.p.x() / row.p.z(), row.p.y() / row.p.z());
-    sensor::Lens lens = camera_->lens();
 
+    // Distortion and focal length with their changes
+    sensor::Lens lens = camera_->lens();
     lens.k[0] += change[kK1];
     lens.k[1] += change[kK2];
     const Eigen::Vector2d distorted = lens.distort(ray);
     const sensor::Pinhole& c = camera_->color;
     const Eigen::Vector2d focal = Eigen::Vector2d(c.fx, c.fy) * (1.0 + change[kFocal]);
-
     const Eigen::Vector2d centre(c.cx + change[kCentreX], c.cy + change[kCentreY]);
     const double weight = 1.0 / seen_->pixel_sigma;
+
     Eigen::Map<Eigen::Vector2d>(residuals).noalias() =
         weight * (seen_->pixel - focal.cwiseProduct(distorted) - centre);
 
     if (jacobians == nullptr) return true;
 
+    // Derivatives by the point
     const Eigen::Matrix2d by_ray = lens.jacobian(ray);
     const sensor::Lens::ByCoefficients by_k = lens.by_coefficients(ray);
     Eigen::Matrix<double, 2, 3> ray_by_p;
     ray_by_p << 1.0, 0.0, -ray.x(), 0.0, 1.0, -ray.y();
     const Eigen::Matrix<double, 2, 3> by_p = -weight / row.p.z() * focal.asDiagonal() * by_ray * ray_by_p;
 
+    // Derivatives by the camera
     Eigen::Matrix<double, 2, kCameraUnknowns> by_camera = Eigen::Matrix<double, 2, kCameraUnknowns>::Zero();
     by_camera.col(kFocal) = -weight * Eigen::Vector2d(c.fx, c.fy).cwiseProduct(distorted);
     by_camera(0, kCentreX) = -weight;
     by_camera(1, kCentreY) = -weight;
     by_camera.col(kK1) = -weight * by_k.by_k1 * focal.cwiseProduct(ray);
-
     by_camera.col(kK2) = by_k.k2_by_k1 * by_camera.col(kK1);
+
     Derivatives<2>(jacobians).put(by_camera, by_p, row);
     return true;
   }
@@ -144,6 +149,8 @@ class DepthCost final : public ceres::SizedCostFunction<1, kCameraUnknowns, kSte
   bool Evaluate(const double* const* parameters, double* residuals, double** jacobians) const override {
     const double* change = parameters[0];
     const RowPoint row(*pose_, share_, change, parameters[1], parameters[2]);
+
+    // Depth as a camera with these slopes measures it
     const double z = row.p.z();
     const double grow = 1.0 - z * (change[kSlopeX] * seen_->ray.x() + change[kSlopeY] * seen_->ray.y());
     if (grow < 0.1) return false;
@@ -194,6 +201,8 @@ void add_observations(const CalibrationProblem& problem, CameraUnknowns& unknown
   const double height = problem.camera.color.height;
   for (const CalibrationObservation& o : problem.observations) {
     const CalibrationPose& pose = problem.poses[static_cast<std::size_t>(o.pose)];
+
+    // Readout time of the row, relative to the middle
     const double share = o.pixel.y() / height - 0.5;
     double* step = unknowns.step(o.pose);
     double* point = unknowns.point(o.point);
@@ -225,9 +234,9 @@ bool adjust(const CalibrationProblem& problem, CameraUnknowns& unknowns, ceres::
   return summary.IsSolutionUsable();
 }
 
-/// The cost around where the unknowns are, poses and points eliminated.
-std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, CameraUnknowns& unknowns,
-                                         ceres::Problem& ceres_problem) {
+/// The camera's columns of the Jacobian, then those of poses and points that the cost depends on.
+ceres::Problem::EvaluateOptions columns_of(const CalibrationProblem& problem, CameraUnknowns& unknowns,
+                                           const ceres::Problem& ceres_problem) {
   ceres::Problem::EvaluateOptions order;
   order.parameter_blocks.push_back(unknowns.change());
   for (std::size_t i = 0; i < problem.poses.size(); ++i) {
@@ -240,40 +249,38 @@ std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, Came
     double* point = unknowns.point(static_cast<int>(i));
     if (ceres_problem.HasParameterBlock(point)) order.parameter_blocks.push_back(point);
   }
+  return order;
+}
 
-  CameraEvidence evidence;
-  evidence.at = Eigen::Map<const CameraChange>(unknowns.change());
-  std::vector<double> residuals;
-  ceres::CRSMatrix crs;
-
-  if (!ceres_problem.Evaluate(order, &evidence.cost, &residuals, nullptr, &crs)) return std::nullopt;
-
+/// The part of each row's derivative by the camera that remains when poses and points follow it.
+std::optional<Eigen::MatrixXd> derivative_by_camera_alone(const ceres::CRSMatrix& crs) {
   const Eigen::SparseMatrix<double> jacobian = Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(
       crs.num_rows, crs.num_cols, static_cast<int>(crs.values.size()), crs.rows.data(), crs.cols.data(),
       crs.values.data());
   constexpr int kCamera = kCameraUnknowns;
-  const int others = crs.num_cols - kCamera;
-
-  const Eigen::SparseMatrix<double> by_others = jacobian.rightCols(others);
-
+  const Eigen::SparseMatrix<double> by_others = jacobian.rightCols(crs.num_cols - kCamera);
   const Eigen::MatrixXd by_camera = jacobian.leftCols(kCamera);
+
+  // Normal equations of poses and points
   Eigen::SparseMatrix<double> normal = by_others.transpose() * by_others;
   normal.diagonal() *= 1.0 + 1e-9;  // a point may be seen along one ray only
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);
-
   if (factor.info() != Eigen::Success) return std::nullopt;
 
-  // The part of each row's derivative by the camera that remains when poses and points follow it.
   const Eigen::MatrixXd answered = factor.solve(Eigen::MatrixXd(by_others.transpose() * by_camera));
-  const Eigen::MatrixXd alone = by_camera - by_others * answered;
-
+  Eigen::MatrixXd alone = by_camera - by_others * answered;
   if (!alone.allFinite()) return std::nullopt;
+  return alone;
+}
 
+/// Gradient and information of each block of time, and of all.
+void add_blocks(const CalibrationProblem& problem, const Eigen::MatrixXd& derivatives,
+                const std::vector<double>& residuals, CameraEvidence& evidence) {
   std::map<int, EvidenceBlock> blocks;
   Eigen::Index row = 0;
   for (const CalibrationObservation& o : problem.observations) {
     const Eigen::Index rows = o.depth > 0.0 ? 3 : 2;
-    const auto derivative = alone.middleRows(row, rows);
+    const auto derivative = derivatives.middleRows(row, rows);
     const Eigen::Map<const Eigen::VectorXd> residual(residuals.data() + row, rows);
     EvidenceBlock& block = blocks[problem.poses[static_cast<std::size_t>(o.pose)].block];
 
@@ -287,7 +294,22 @@ std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, Came
     evidence.all.information += block.information;
     evidence.blocks.push_back(block);
   }
+}
 
+/// The quadratic cost around the present unknowns, with poses and points eliminated.
+std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, CameraUnknowns& unknowns,
+                                         ceres::Problem& ceres_problem) {
+  CameraEvidence evidence;
+  evidence.at = Eigen::Map<const CameraChange>(unknowns.change());
+  std::vector<double> residuals;
+  ceres::CRSMatrix crs;
+  if (!ceres_problem.Evaluate(columns_of(problem, unknowns, ceres_problem), &evidence.cost, &residuals,
+                              nullptr, &crs))
+    return std::nullopt;
+
+  const auto alone = derivative_by_camera_alone(crs);
+  if (!alone) return std::nullopt;
+  add_blocks(problem, *alone, residuals, evidence);
   return evidence;
 }
 
@@ -304,6 +326,8 @@ sensor::Camera changed_camera(const sensor::Camera& given, const CameraChange& c
   camera.depth_slope[0] += change[kSlopeX];
   camera.depth_slope[1] += change[kSlopeY];
   camera.depth_delay_s += change[kDelay];
+
+  // A readout time only if given or estimated
   if (given.readout_s || change[kReadout] != 0.0) camera.readout_s = change[kReadout];
   return camera;
 }
@@ -333,19 +357,22 @@ std::optional<CameraEvidence> camera_evidence(CalibrationProblem& problem, const
   ceres::Problem::Options options;
   options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
 
+  // Robust losses, since matches may be wrong
   ceres::HuberLoss pixel_loss(1.0);
   ceres::CauchyLoss depth_loss(1.5);  // corners at the rim of things have the depth of the background
   ceres::Problem ceres_problem(options);
   add_observations(problem, unknowns, &pixel_loss, &depth_loss, ceres_problem);
   if (!adjust(problem, unknowns, ceres_problem)) return std::nullopt;
 
+  // Poses and points are eliminated
   auto evidence = eliminated(problem, unknowns, ceres_problem);
+
+  // The problem takes the adjusted poses and points
   for (std::size_t i = 0; i < problem.poses.size(); ++i) {
     const Eigen::Map<const Eigen::Matrix<double, kStep, 1>> step(unknowns.step(static_cast<int>(i)));
     geometry::Rigid3& pose = problem.poses[i].camera_from_world;
     pose = {geometry::exp_so3(step.head<3>()) * pose.rotation, pose.translation + step.tail<3>()};
   }
-
   for (std::size_t i = 0; i < problem.points.size(); ++i)
     problem.points[i] = Eigen::Map<const Eigen::Vector3d>(unknowns.point(static_cast<int>(i)));
   return evidence;

@@ -38,6 +38,8 @@ struct Measured {
 /// chi-square.
 Measured measured_by(const std::vector<CameraEvidence>& evidence, const CameraPrior& prior) {
   const auto unit = prior.wrong_sigma.asDiagonal();
+
+  // Sum of all evidence, in units of the prior
   CameraCovariance information = kSofter * CameraCovariance::Identity();
   CameraChange gradient = CameraChange::Zero();  // at the prior's mean
   for (const CameraEvidence& e : evidence) {
@@ -47,6 +49,7 @@ Measured measured_by(const std::vector<CameraEvidence>& evidence, const CameraPr
   const Eigen::LLT<CameraCovariance> factor(information);
   const CameraChange found = -factor.solve(gradient);
 
+  // Scatter of the blocks' gradients at the minimum
   CameraCovariance scatter = CameraCovariance::Zero();
   int blocks = 0;
   for (const CameraEvidence& e : evidence) {
@@ -57,6 +60,7 @@ Measured measured_by(const std::vector<CameraEvidence>& evidence, const CameraPr
     }
   }
 
+  // Few blocks do not show their scatter
   CameraCovariance middle = kFewBlocks * information;
   if (blocks >= kLeastBlocks) {
     scatter *= static_cast<double>(blocks) / (blocks - 1);
@@ -64,6 +68,7 @@ Measured measured_by(const std::vector<CameraEvidence>& evidence, const CameraPr
     middle = kOwnScatter * scatter + (1.0 - kOwnScatter) * chi2 * information;
   }
 
+  // Sandwich covariance, plus errors of the model
   const CameraCovariance half = factor.solve(middle);
   const CameraCovariance covariance = factor.solve(CameraCovariance(half.transpose()));
   const CameraCovariance model = model_sigma().cwiseAbs2().asDiagonal();
@@ -94,6 +99,7 @@ Case combined(const Measured& measured, const CameraPrior& prior,
         std::pow((is_wrong ? prior.wrong_sigma : prior.right_sigma)[static_cast<Eigen::Index>(u)], 2);
   }
 
+  // Kalman update of the prior by the evidence
   const CameraCovariance spread = measured.covariance + CameraCovariance(variance.asDiagonal());
   const Eigen::LLT<CameraCovariance> factor(spread);
   const CameraChange off = measured.mean - prior.mean;
@@ -106,7 +112,7 @@ Case combined(const Measured& measured, const CameraPrior& prior,
   for (std::size_t g = 0; g < kCameraGroups; ++g)
     one.log_weight += std::log(std::max(1e-300, wrong[g] ? prior.wrong[g] : 1.0 - prior.wrong[g]));
 
-  // No camera reads a picture before it is taken: a wrong readout has half a normal distribution.
+  // A readout time is not negative: the prior of a wrong one is half a normal distribution.
   double& readout = one.mean[kReadout];
   if (wrong[kReadoutGroup])
     one.log_weight += std::log(2.0) + log_normal_cdf(readout / std::sqrt(one.covariance(kReadout, kReadout)));
@@ -137,6 +143,8 @@ CameraGroup group_of(CameraUnknown unknown) {
 
 CameraPosterior camera_posterior(const std::vector<CameraEvidence>& evidence, const CameraPrior& prior) {
   const Measured measured = measured_by(evidence, prior);
+
+  // Every choice of groups whose prior is wrong
   std::vector<Case> cases;
   for (unsigned choice = 0; choice < 1U << kCameraGroups; ++choice) {
     std::array<bool, kCameraGroups> wrong{};
@@ -144,12 +152,13 @@ CameraPosterior camera_posterior(const std::vector<CameraEvidence>& evidence, co
     cases.push_back(combined(measured, prior, wrong));
   }
 
+  // Weights relative to the largest, against underflow
   double most = cases.front().log_weight;
   for (const Case& one : cases) most = std::max(most, one.log_weight);
   double sum = 0.0;
-
   for (Case& one : cases) sum += std::exp(one.log_weight - most);
 
+  // Mean and covariance of the mixture
   CameraPosterior posterior;
   for (const Case& one : cases) {
     const double weight = std::exp(one.log_weight - most) / sum;

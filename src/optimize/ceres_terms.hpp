@@ -104,6 +104,7 @@ class PointCost : public ceres::SizedCostFunction<3, kPoseBlock, 3> {
     Eigen::Vector3d r;
     Eigen::Matrix<double, 3, 6> j;
     if (point_residual(term, pose, camera_, r, jacobians != nullptr ? &j : nullptr) == 0) {
+      // Behind the camera: a constant cost
       r << std::sqrt(kBehind), 0.0, 0.0;
       j.setZero();
     }
@@ -128,6 +129,7 @@ class LineCost : public ceres::SizedCostFunction<4, kPoseBlock, kLineBlock> {
       : view_(seen, camera),
         projection_(geometry::line_projection(camera.fx, camera.fy, camera.cx, camera.cy)) {}
 
+  // Errors of the segment's ends, with derivatives by pose and line.
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
     LineDerivatives j;
     Eigen::Map<Eigen::Vector4d> r(residuals);
@@ -149,6 +151,7 @@ class EdgeCost : public ceres::SizedCostFunction<6, kPoseBlock, kPoseBlock> {
  public:
   explicit EdgeCost(const BundleEdge& edge) : view_(edge) {}
 
+  // Error of the relative pose, with derivatives by both poses.
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
     EdgeDerivatives j;
     Eigen::Map<geometry::Vector6d> r(residuals);

@@ -64,15 +64,16 @@ struct LandmarkFamily {
       ++landmark_begin[static_cast<std::size_t>(s.landmark) + 1];
     }
 
+    // Counting sort of the observations by landmark
     for (std::size_t i = 1; i <= slots; ++i) slot_begin[i] += slot_begin[i - 1];
     for (std::size_t i = 1; i <= landmarks; ++i) landmark_begin[i] += landmark_begin[i - 1];
     std::vector<std::size_t> next(landmark_begin.begin(), landmark_begin.end() - 1);
     by_landmark.resize(observations.size());
-
     for (std::size_t i = 0; i < observations.size(); ++i) {
       by_landmark[next[static_cast<std::size_t>(observations[i].landmark)]++] = static_cast<int>(i);
     }
 
+    // Memory for a linearisation
     cross.resize(observations.size());
     square.resize(observations.size());
     gradients.resize(observations.size());
@@ -83,6 +84,7 @@ struct LandmarkFamily {
     step.resize(landmarks);
   }
 
+  // Adds up the observations of each landmark.
   void sum() {
     for (std::size_t n = 0; n < hessian.size(); ++n) {
       hessian[n].setZero();

@@ -65,6 +65,7 @@ class MapRound {
   }
 
   RoundSummary solve() {
+    // Dense equations are faster for few poses
     constexpr std::size_t kMostDense = 100;  // poses
     ceres::Solver::Options solver;
     solver.linear_solver_type =
@@ -91,6 +92,8 @@ class MapRound {
   void add_poses() {
     for (std::size_t i = 0; i <= problem_.poses.size(); ++i) {  // the world last
       ceres_.AddParameterBlock(unknowns_.pose(i), kPoseBlock, &pose_manifold_);
+
+      // The world and fixed poses are constants
       if (i == problem_.poses.size() || problem_.poses[i].fixed)
         ceres_.SetParameterBlockConstant(unknowns_.pose(i));
       ordering_->AddElementToGroup(unknowns_.pose(i), 1);
@@ -98,6 +101,8 @@ class MapRound {
   }
   void add_observations() {
     const UsedObservations used(problem_);
+
+    // Landmarks are eliminated before the poses
     for (const int i : used.points) {
       const BundlePointObservation& o = problem_.point_observations[static_cast<std::size_t>(i)];
       double* point = unknowns_.point(static_cast<std::size_t>(o.point));

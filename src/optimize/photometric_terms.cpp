@@ -63,6 +63,8 @@ PLUMBLINE_CLONES void look(const PhotometricTerm* terms, std::size_t count, cons
   constexpr float kNearest_m = 0.1F;
   constexpr std::int32_t kNan = 0x7FC00000;
   Places at;
+
+  // Arrays by coordinate, for vector instructions
   for (std::size_t i = 0; i < count; ++i) {
     const float* point = terms[i].point.data();
     at.x[i] = point[0];
@@ -72,12 +74,14 @@ PLUMBLINE_CLONES void look(const PhotometricTerm* terms, std::size_t count, cons
 
   for (std::size_t i = count; i % kLanes != 0; ++i) at.x[i] = at.y[i] = at.z[i] = 0.0F;
 
+  // Pixels onto which the terms project
   for (std::size_t i = 0; i < count; i += kLanes) {
     Floats x, y, z;
     std::memcpy(&x, at.x + i, sizeof x);
     std::memcpy(&y, at.y + i, sizeof y);
     std::memcpy(&z, at.z + i, sizeof z);
 
+    // Projection; places outside the image become pixel 0
     const Floats in_x = v.r[0][0] * x + (v.r[0][1] * y + v.r[0][2] * z) + v.t[0];
     const Floats in_y = v.r[1][0] * x + (v.r[1][1] * y + v.r[1][2] * z) + v.t[1];
     const Floats in_z = v.r[2][0] * x + (v.r[2][1] * y + v.r[2][2] * z) + v.t[2];
@@ -87,6 +91,7 @@ PLUMBLINE_CLONES void look(const PhotometricTerm* terms, std::size_t count, cons
     u = reinterpret_cast<Floats>(reinterpret_cast<Integers>(u) & inside);
     w = reinterpret_cast<Floats>(reinterpret_cast<Integers>(w) & inside);
 
+    // Whole pixel, and shares for the interpolation
     const Integers column = __builtin_convertvector(u, Integers), line = __builtin_convertvector(w, Integers);
     const Integers pixel = line * v.row + column, unseen = ~inside & kNan;
     u -= __builtin_convertvector(column, Floats);
@@ -97,6 +102,7 @@ PLUMBLINE_CLONES void look(const PhotometricTerm* terms, std::size_t count, cons
     std::memcpy(seen + i, &unseen, sizeof unseen);
   }
 
+  // Intensities; NaN remains NaN
   for (std::size_t i = 0; i < count; ++i) {
     const float* top = v.pixels + at.pixel[i];
     const float* low = top + v.row;
@@ -135,14 +141,16 @@ PLUMBLINE_CLONES void sum_block(const PhotometricTerm* terms, const float* seen,
   const Floats in_jacobian{1.0F, 1.0F, 1.0F, 1.0F, 1.0F, 1.0F, 0.0F, 0.0F};
   const Floats is_residual{0.0F, 0.0F, 0.0F, 0.0F, 0.0F, 0.0F, 1.0F, 0.0F};
   Floats s0{}, s1{}, s2{}, s3{}, s4{}, s5{}, s6{};  // an array would not stay in registers
-
   float cost = 0.0F;
+
+  // Terms outside the image cost a constant
   for (std::size_t i = 0; i < count; ++i) {
     if (std::isnan(seen[i])) {
       cost += 0.5F;
       continue;
     }
 
+    // Residual in sigmas, with Huber's loss
     const PhotometricTerm& term = terms[i];
     const float e = (seen[i] - scale.gain * term.value) * term.weight * scale.per_sigma;
     const float size = std::abs(e);
@@ -150,10 +158,12 @@ PLUMBLINE_CLONES void sum_block(const PhotometricTerm* terms, const float* seen,
     const float w = near ? 1.0F : scale.threshold / size;
     cost += near ? 0.5F * e * e : scale.threshold * (size - 0.5F * scale.threshold);
 
+    // Jacobian and residual in one vector
     Floats row;
     std::memcpy(&row, reinterpret_cast<const char*>(&term), sizeof row);
     row = row * (in_jacobian * (scale.gain * term.weight * scale.per_sigma)) + is_residual * e;
 
+    // Products of the vector with itself
     const Floats weighted = row * w;
     s0 += weighted[0] * row;
     s1 += weighted[1] * row;
@@ -189,6 +199,7 @@ PhotometricSums sum_photometric(const PhotometricFamily& family, const Rigid3& c
                     static_cast<float>(loss)};
   PhotometricSums sums;
 
+  // Blocks are added in double precision
   for_blocks(family, camera_from_world, [&](std::size_t first, std::size_t count, const float* seen) {
     Sums block;
     sum_block(family.terms.data() + first, seen, count, scale, block);
@@ -212,6 +223,8 @@ double photometric_correlation(const PhotometricFamily& family, const Rigid3& ca
                                int min_terms) {
   double vv = 0.0, ss = 0.0, vs = 0.0;
   int count = 0;
+
+  // Only terms that the image shows
   for_blocks(family, camera_from_world, [&](std::size_t first, std::size_t block, const float* seen) {
     for (std::size_t i = 0; i < block; ++i) {
       if (std::isnan(seen[i])) continue;

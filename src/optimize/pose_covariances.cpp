@@ -48,9 +48,9 @@ std::vector<Matrix6d> BundleRound::held_by_prior(double information) {
   return reduced_.inverse_blocks(equations_, kLeastShare);
 }
 
-/// Directions of landmarks that hardly anything holds, such as the distance of a point that is seen from one
-/// place, make the elimination inexact: they are left out of it. If that is not enough, a pose is free: all
-/// are held by the weakest prior with which the equations can be solved.
+/// Directions of landmarks that hardly anything constrains, such as the distance of a point that is seen from
+/// one place, make the elimination inexact: they are left out of it. If that is not enough, a pose is free:
+/// the weakest prior that makes the equations solvable is put on all.
 std::vector<Matrix6d> BundleRound::repaired() {
   std::vector<Matrix6d> blocks = held_by_prior(0.0);
   if (are_held(blocks)) return blocks;
@@ -73,6 +73,7 @@ PoseCovariances BundleRound::covariances(const BundleState& state) {
                 std::to_string(kMostNumbers / 1'000'000) + " million numbers would be needed"};
   }
 
+  // Poses that are not constrained need a repair
   constexpr double kLeastShare = 1e-13;  // below, rounding errors are as large as what is taken out
   std::vector<Matrix6d> blocks = reduced_.inverse_blocks(equations_, kLeastShare);
   if (!are_held(blocks)) blocks = repaired();

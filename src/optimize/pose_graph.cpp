@@ -158,6 +158,7 @@ class Graduated {
   std::vector<double> gates_;
 };
 
+// Throws if an edge does not join two different poses.
 void check(const PoseGraph& graph) {
   const auto count = static_cast<int>(graph.poses.size());
   for (const GraphEdge& edge : graph.edges) {
@@ -189,6 +190,7 @@ PoseGraphSummary solve_pose_graph(PoseGraph& graph, bool robust) {
     return summary;
   }
 
+  // Dimensions and initial cost of the edges
   Solver solver(graph);
   summary.edges.resize(graph.edges.size());
   for (std::size_t i = 0; i < graph.edges.size(); ++i) {
@@ -196,6 +198,7 @@ PoseGraphSummary solve_pose_graph(PoseGraph& graph, bool robust) {
     summary.initial_cost += 0.5 * solver.chi2(i);
   }
 
+  // Graduated non-convexity, or plain least squares
   if (robust) {
     if (!Graduated(graph, solver, summary).run()) return summary;
   } else {
@@ -206,6 +209,7 @@ PoseGraphSummary solve_pose_graph(PoseGraph& graph, bool robust) {
     if (!solved.IsSolutionUsable()) return summary;
   }
 
+  // Edges of small weight are rejected
   for (std::size_t i = 0; i < graph.edges.size(); ++i) {
     EdgeVerdict& verdict = summary.edges[i];
     verdict.chi2 = solver.chi2(i);

@@ -51,6 +51,7 @@ struct RowSums {
   alignas(32) double g[8] = {};
 
   void add(const Row6& j, double r, double w) {
+    // The lower triangle, in whole vectors
     alignas(32) const double row[8] = {j(0), j(1), j(2), j(3), j(4), j(5), 0.0, 0.0};
     for (int a = 0; a < 4; ++a) {
       const double wa = w * row[a];
@@ -137,6 +138,7 @@ PoseEquations evaluate(const PoseProblem& problem, const Rigid3& pose, const Pos
   add_planes(problem, pose, options, sums, n.cost);
   sums.move_to(n);
 
+  // All photometric terms together have one weight
   if (problem.photometric) {
     const PhotometricSums seen = sum_photometric(*problem.photometric, pose, options.photometric_loss);
     n.h += options.photometric_weight * seen.h;
@@ -157,6 +159,7 @@ void add_prior(const PoseProblem& problem, const Rigid3& pose, PoseEquations& n)
   n.h += problem.prior->information;
 }
 
+// Squared errors of the depth samples.
 std::vector<double> plane_errors(const PoseProblem& problem, const Rigid3& pose) {
   std::vector<double> errors;
   errors.reserve(problem.planes.size());
@@ -175,6 +178,7 @@ std::vector<double> photometric_errors(const PoseProblem& problem, const Rigid3&
   return errors;
 }
 
+// Terms within three sigmas, and their RMS.
 FamilySummary summarise(const std::vector<double>& squared) {
   constexpr double kGateSq = 9.0;
   FamilySummary s;
@@ -205,10 +209,13 @@ PoseSummary solve_pose(const PoseProblem& problem, const Rigid3& camera_from_wor
   PoseSummary summary;
   Rigid3 pose = camera_from_world;
   PoseEquations n = evaluate(problem, pose, options);
+
+  // Information without the prior, for the summary
   summary.information = n.h;
   add_prior(problem, pose, n);
   summary.initial_cost = n.cost;
 
+  // Levenberg-Marquardt, until the step is small
   double lambda = 1e-5;
   for (; summary.iterations < options.max_iterations && !summary.converged; ++summary.iterations) {
     Matrix6d damped = n.h.selfadjointView<Eigen::Lower>();
@@ -216,12 +223,14 @@ PoseSummary solve_pose(const PoseProblem& problem, const Rigid3& camera_from_wor
     const Vector6d step = -damped.ldlt().solve(n.g);
     if (!step.allFinite()) break;
 
+    // Cost and information at the new pose
     const Rigid3 trial = geometry::exp_se3(step) * pose;
     PoseEquations at_trial = evaluate(problem, trial, options);
     const Matrix6d information = at_trial.h;
     add_prior(problem, trial, at_trial);
     summary.converged = step.cwiseAbs().maxCoeff() < options.min_step;
 
+    // Accepted if the cost does not rise
     if (at_trial.cost <= n.cost) {
       pose = trial;
       n = at_trial;
@@ -236,6 +245,8 @@ PoseSummary solve_pose(const PoseProblem& problem, const Rigid3& camera_from_wor
   summary.information = summary.information.selfadjointView<Eigen::Lower>();
   summary.camera_from_world = pose;
   summary.final_cost = n.cost;
+
+  // Inliers of each family at the solution
   summary.points = summarise(point_errors(problem, pose));
   summary.lines = summarise(line_errors(problem, pose));
   summary.planes = summarise(plane_errors(problem, pose));
@@ -247,6 +258,7 @@ std::vector<double> point_errors(const PoseProblem& problem, const Rigid3& camer
   std::vector<double> errors;
   errors.reserve(problem.points.size());
   for (const PointTerm& term : problem.points) {
+    // Behind the camera: never an inlier
     Eigen::Vector3d r;
     const int rows = point_residual(term, camera_from_world, problem.camera, r, nullptr);
     errors.push_back(rows == 0 ? std::numeric_limits<double>::infinity() : r.head<2>().squaredNorm());

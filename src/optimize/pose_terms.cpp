@@ -16,6 +16,7 @@ int point_residual(const PointTerm& term, const geometry::Rigid3& camera_from_wo
   const Eigen::Vector3d p = camera_from_world * term.world;
   if (p.z() < kMinDepth) return 0;
 
+  // Reprojection error in sigmas
   const double iz = 1.0 / p.z();
   const double x = p.x() * iz;
   const double y = p.y() * iz;
@@ -23,10 +24,12 @@ int point_residual(const PointTerm& term, const geometry::Rigid3& camera_from_wo
   residual(0) = w * (term.pixel.x() - (camera.fx * x + camera.cx));
   residual(1) = w * (term.pixel.y() - (camera.fy * y + camera.cy));
 
+  // Depth error, if depth was measured
   const bool has_depth = term.depth > 0.0;
   const double wz = has_depth ? 1.0 / term.depth_sigma : 0.0;
   residual(2) = has_depth ? wz * (term.depth - p.z()) : 0.0;
 
+  // Derivatives by a left perturbation of the pose
   if (jacobian != nullptr) {
     const double a = w * camera.fx;
     const double b = w * camera.fy;
@@ -46,6 +49,7 @@ bool line_residual(const LineTerm& term, const geometry::Rigid3& camera_from_wor
   const double norm_sq = l.x() * l.x() + l.y() * l.y();
   if (line.n.squaredNorm() < 1e-8 || norm_sq < 1e-6) return false;
 
+  // Distances of both ends from the projected line
   const double norm = std::sqrt(norm_sq);
   const double w = 1.0 / (norm * term.pixel_sigma);
   const Eigen::Vector3d s[2] = {term.start.homogeneous(), term.end.homogeneous()};

@@ -27,6 +27,7 @@ Sparse upper_triangle(const std::vector<std::map<int, Matrix6d>>& rows) {
   Sparse upper(size, size);
   upper.reserve(static_cast<Eigen::Index>(36 * blocks));
 
+  // Eigen takes the entries column by column
   for (std::size_t r = 0; r < rows.size(); ++r) {
     for (int i = 0; i < 6; ++i) {
       const int column = 6 * static_cast<int>(r) + i;
@@ -70,6 +71,7 @@ std::vector<double> selected_inverse(const Sparse& l) {
       }
     }
 
+    // Entries below the diagonal, then the diagonal
     double rest = 1.0 / value[diagonal];
     for (int p = diagonal + 1; p < end; ++p) {
       place[static_cast<std::size_t>(row[p])] = -1;
@@ -112,6 +114,7 @@ std::vector<Matrix6d> SparseBlocks::inverse_blocks() const {
   factor.compute(upper_triangle(rows_));
   if (factor.info() != Eigen::Success) return {};
 
+  // Only entries where the factor is not zero
   const Sparse& l = factor.l();
   const std::vector<double> inverse = selected_inverse(l);
   const auto entry = [&](int a, int b) {
@@ -122,6 +125,7 @@ std::vector<Matrix6d> SparseBlocks::inverse_blocks() const {
                                             l.innerIndexPtr())];
   };
 
+  // Back in the order of the poses
   std::vector<Matrix6d> blocks(rows_.size());
   for (std::size_t slot = 0; slot < blocks.size(); ++slot) {
     const auto at = [&](int i) { return factor.permuted(static_cast<Eigen::Index>(6 * slot) + i); };

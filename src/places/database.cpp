@@ -37,6 +37,8 @@ void Database::file(Kind kind, const features::Descriptor256& descriptor, const 
   kinds_[at(word)] = kind;
   index_[at(word)].push_back(entry);
   seen_[at(entry.slot)].mass += weights_[at(word)];
+
+  // Listed once, on becoming overfull
   const bool before = vocabulary_.overfull(word);
   vocabulary_.count(word);
   if (!before && vocabulary_.overfull(word)) overfull_.push_back(word);
@@ -50,6 +52,8 @@ void Database::add(KeyframeId id, std::shared_ptr<const FrameFeatures> features)
   keyframes_.push_back(id);
   seen_.push_back({features, 0.0});
   make_room();
+
+  // Each feature under its word
   for (std::size_t i = 0; i < features->descriptors.size(); ++i) {
     file(Kind::kPoint, features->descriptors[i], {slot, static_cast<std::int32_t>(i)});
   }
@@ -57,6 +61,8 @@ void Database::add(KeyframeId id, std::shared_ptr<const FrameFeatures> features)
     file(Kind::kLine, features->lines[i].descriptor, {slot, static_cast<std::int32_t>(i)});
   }
   divide_overfull();
+
+  // Weights change slowly: again only after much growth
   const std::int64_t features_now =
       vocabulary_.feature_count(Kind::kPoint) + vocabulary_.feature_count(Kind::kLine);
   if (static_cast<double>(features_now) >= kGrowthToReweigh * static_cast<double>(weighed_at_)) reweigh();
@@ -64,6 +70,8 @@ void Database::add(KeyframeId id, std::shared_ptr<const FrameFeatures> features)
 
 void Database::divide_overfull() {
   int divisions = 0;
+
+  // A few at a time: adding a keyframe stays fast
   std::size_t next = 0;
   for (; next < overfull_.size() && divisions < kMaxDivisions; ++next) {
     if (!vocabulary_.overfull(overfull_[next])) continue;
@@ -78,11 +86,12 @@ void Database::divide(Word word) {
   const std::vector<Entry> entries = index_[at(word)];
   std::vector<features::Descriptor256> members;
   members.reserve(entries.size());
-
   for (const Entry& e : entries) members.push_back(descriptor(kind, e));
+
   const std::vector<Word> words = vocabulary_.divide(word, members);
   if (words.empty()) return;
 
+  // The new words take the entries of the divided one
   make_room();
   const double old_weight = weights_[at(word)];
   index_[at(word)] = {};
@@ -94,6 +103,8 @@ void Database::divide(Word word) {
       weights_[child] = vocabulary_.weight(words[i]);
       if (vocabulary_.overfull(words[i])) overfull_.push_back(words[i]);
     }
+
+    // The feature and its mass move to the new word
     index_[child].push_back(entries[i]);
     seen_[at(entries[i].slot)].mass += weights_[child] - old_weight;
   }
@@ -105,6 +116,8 @@ void Database::reweigh() {
   for (std::size_t w = 0; w < weights_.size(); ++w) {
     weights_[w] = vocabulary_.is_word(static_cast<Word>(w)) ? vocabulary_.weight(static_cast<Word>(w)) : 0.0;
   }
+
+  // A keyframe's mass is the sum of its weights
   for (Seen& seen : seen_) seen.mass = 0.0;
   for (std::size_t w = 0; w < weights_.size(); ++w) {
     for (const Entry& e : index_[w]) seen_[at(e.slot)].mass += weights_[w];
@@ -119,6 +132,7 @@ Database::Scores Database::query(const FrameFeatures& image) const {
   std::vector<Word> words;
   words.reserve(image.descriptors.size() + image.lines.size());
 
+  // The image as a vector of weighted words
   for (const auto& d : image.descriptors) words.push_back(vocabulary_.word(Kind::kPoint, d));
   for (const auto& l : image.lines) words.push_back(vocabulary_.word(Kind::kLine, l.descriptor));
   std::sort(words.begin(), words.end());
@@ -135,6 +149,7 @@ Database::Scores Database::query(const FrameFeatures& image) const {
     first = last;
     if (!(weight > 0.0) || entries.size() > kCommon) continue;
 
+    // Sum of the smaller share of each common word
     for (std::size_t i = 0; i < entries.size();) {
       const std::int32_t slot = entries[i].slot;
       const std::size_t begin = i;
@@ -173,6 +188,7 @@ std::vector<Hit> Database::Scores::best(std::size_t count, const std::function<b
     const auto block =
         std::min<std::ptrdiff_t>(slots.end() - sorted, static_cast<std::ptrdiff_t>(2 * count + 16));
     std::partial_sort(sorted, sorted + block, slots.end(), better);
+
     for (const auto end = sorted + block; sorted != end; ++sorted) {
       const KeyframeId id = database_->keyframes_[at(*sorted)];
       if (hits.size() < count && (!allowed || allowed(id))) {

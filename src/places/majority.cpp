@@ -35,6 +35,7 @@ std::vector<Descriptor256> first_centres(const std::vector<Descriptor256>& descr
     for (const int d : nearest) total += static_cast<std::uint64_t>(d) * static_cast<std::uint64_t>(d);
     if (total == 0) break;  // all descriptors are centres
 
+    // A draw in proportion to the squared distances
     std::uint64_t draw = random.next() % total;
     std::size_t chosen = 0;
     for (; chosen < nearest.size(); ++chosen) {
@@ -43,6 +44,7 @@ std::vector<Descriptor256> first_centres(const std::vector<Descriptor256>& descr
       draw -= d * d;
     }
 
+    // Distances from the nearest centre
     centres.push_back(descriptors[chosen]);
     const std::vector<int>& added = distances.from(centres.back());
     for (std::size_t i = 0; i < nearest.size(); ++i) nearest[i] = std::min(nearest[i], added[i]);
@@ -51,6 +53,7 @@ std::vector<Descriptor256> first_centres(const std::vector<Descriptor256>& descr
   return centres;
 }
 
+// Number of the nearest centre of each descriptor.
 std::vector<int> assign(const std::vector<Descriptor256>& centres, std::size_t count, Distances& distances) {
   std::vector<int> member_of(count, 0);
   std::vector<int> nearest(count, 257);
@@ -66,7 +69,7 @@ std::vector<int> assign(const std::vector<Descriptor256>& centres, std::size_t c
   return member_of;
 }
 
-/// Centres without members and repeated ones go.
+/// Removes centres without members, and repeated ones.
 void drop_idle(std::vector<Descriptor256>& centres, const std::vector<BitCounter>& counters) {
   std::vector<Descriptor256> kept;
   for (std::size_t c = 0; c < centres.size(); ++c) {
@@ -80,6 +83,8 @@ void drop_idle(std::vector<Descriptor256>& centres, const std::vector<BitCounter
 
 void BitCounter::add(const Descriptor256& descriptor) {
   ++count_;
+
+  // Binary addition with carry, for all bits at once
   Descriptor256 carry = descriptor;
   for (std::size_t level = 0;; ++level) {
     if ((carry[0] | carry[1] | carry[2] | carry[3]) == 0) return;
@@ -99,6 +104,8 @@ Descriptor256 BitCounter::majority() const {
   if ((static_cast<std::uint64_t>(half) >> planes_.size()) != 0) return above;
   Descriptor256 equal;
   equal.fill(~0ULL);
+
+  // Counts are compared with half, highest digit first
   for (std::size_t level = planes_.size(); level-- > 0;) {
     const std::uint64_t digit = ((half >> level) & 1U) != 0 ? ~0ULL : 0ULL;
     for (std::size_t w = 0; w < 4; ++w) {
@@ -116,6 +123,7 @@ Clusters k_majority(const std::vector<Descriptor256>& descriptors, int k, int it
   Distances distances(descriptors);
   clusters.centres = first_centres(descriptors, k, seed, distances);
 
+  // Bits of the members of each centre are counted
   for (int round = 0; round < iterations; ++round) {
     clusters.member_of = assign(clusters.centres, descriptors.size(), distances);
     std::vector<BitCounter> counters(clusters.centres.size());
@@ -123,6 +131,7 @@ Clusters k_majority(const std::vector<Descriptor256>& descriptors, int k, int it
       counters[static_cast<std::size_t>(clusters.member_of[i])].add(descriptors[i]);
     }
 
+    // Centres become the majority of their members
     const std::vector<Descriptor256> before = clusters.centres;
     for (std::size_t c = 0; c < counters.size(); ++c) clusters.centres[c] = counters[c].majority();
     drop_idle(clusters.centres, counters);

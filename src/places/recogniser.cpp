@@ -30,6 +30,7 @@ std::vector<Candidate> Recogniser::recognise(const Database::Scores& scores, Key
                                              KeyframeId neighbour,
                                              const std::function<bool(KeyframeId)>& allowed,
                                              const Neighbours& neighbours) {
+  // Scores relative to that of a known neighbour
   const double usual = neighbour.valid() ? scores.of(neighbour) : 0.0;
   const double threshold = std::max(options_.min_absolute, options_.min_score * usual);
   std::vector<Hit> hits = scores.best(static_cast<std::size_t>(options_.hits), allowed, options_.votes);
@@ -50,6 +51,7 @@ std::vector<Recogniser::Island> Recogniser::islands(const std::vector<Hit>& hits
       continue;
     }
 
+    // A hit elsewhere begins another group
     Island& island = result.emplace_back();
     island.candidate.keyframe = hit.keyframe;
     island.candidate.score = island.candidate.group_score = hit.score;
@@ -58,6 +60,7 @@ std::vector<Recogniser::Island> Recogniser::islands(const std::vector<Hit>& hits
     std::sort(island.members.begin(), island.members.end());
   }
 
+  // The best group first
   std::stable_sort(result.begin(), result.end(), [](const Island& a, const Island& b) {
     return a.candidate.group_score > b.candidate.group_score;
   });

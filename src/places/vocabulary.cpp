@@ -29,6 +29,8 @@ void VocabularyOptions::declare(core::OptionTable& table) {
 
 Vocabulary::Vocabulary(const VocabularyOptions& options) : options_(options) {
   options_.branching = std::clamp(options_.branching, 2, kMaxBranching);
+
+  // A tree for points, and one for lines
   for (const Kind kind : kKinds) {
     Node root;
     root.kind = kind;
@@ -46,6 +48,8 @@ std::int64_t Vocabulary::patience(int level) const {
 Word Vocabulary::word(Kind kind, const Descriptor256& descriptor) const {
   auto node = static_cast<Word>(kind);
   std::array<int, kMaxBranching> distances{};
+
+  // Down the tree, always to the nearest centre
   while (nodes_[index_of(node)].children > 0) {
     const Node& n = nodes_[index_of(node)];
     const auto count = static_cast<std::size_t>(n.children);
@@ -85,6 +89,8 @@ Word Vocabulary::add_children(Word parent, const std::vector<Descriptor256>& cen
     nodes_.push_back(child);
     centres_.push_back(centre);
   }
+
+  // Children are consecutive nodes
   nodes_[index_of(parent)].first_child = first;
   nodes_[index_of(parent)].children = static_cast<std::int16_t>(centres.size());
   return first;
@@ -95,11 +101,14 @@ std::vector<Word> Vocabulary::divide(Word word, const std::vector<Descriptor256>
 
   const Clusters clusters =
       k_majority(members, options_.branching, options_.iterations, static_cast<std::uint64_t>(word));
+
+  // Members too similar to divide: tried again later
   if (clusters.centres.size() < 2) {
     nodes_[index_of(word)].divide_at = 2 * nodes_[index_of(word)].features;
     return {};
   }
 
+  // Every member moves to the child of its cluster
   const Word first = add_children(word, clusters.centres);
   std::vector<Word> words;
   words.reserve(members.size());

@@ -23,6 +23,7 @@ std::string join(const std::string& path, const std::string& key) {
   return path.empty() ? key : path + "." + key;
 }
 
+/// The keys that both cameras share.
 void declare_pinhole(core::OptionTable& table, Pinhole& pinhole) {
   constexpr core::Range<double> focal{1e-3, 1e6};
   table.integer("width", pinhole.width, {1, 32768}, "px", "Width of the images");
@@ -33,7 +34,7 @@ void declare_pinhole(core::OptionTable& table, Pinhole& pinhole) {
   table.number("cy", pinhole.cy, {}, "px", "Principal point; 0 is the centre of the topmost pixel");
 }
 
-/// Every key of a pinhole must be there and the principal point inside the image.
+/// Every key of a pinhole must exist, and the principal point must be inside the image.
 void check_pinhole(const ConfigNode& map, const Pinhole& pinhole, const std::string& path,
                    ConfigProblems& problems) {
   for (const char* key : {"width", "height", "fx", "fy", "cx", "cy"}) {
@@ -51,6 +52,7 @@ void check_pinhole(const ConfigNode& map, const Pinhole& pinhole, const std::str
   inside("cy", pinhole.cy, pinhole.height);
 }
 
+/// A finite number, read as an option would be.
 std::optional<double> number_of(const ConfigNode& node) {
   double value = 0.0;
   core::OptionTable table;
@@ -82,7 +84,9 @@ std::optional<Eigen::Matrix4d> read_matrix(const ConfigNode& node) {
   return matrix;
 }
 
+/// The pose of the depth camera; it must be a rigid transform.
 void read_color_from_depth(const ConfigNode& node, Camera& camera, ConfigProblems& problems) {
+  // A matrix of sixteen numbers
   const std::string path = "color_from_depth";
   const std::optional<Eigen::Matrix4d> matrix = read_matrix(node);
   if (!matrix) {
@@ -91,6 +95,7 @@ void read_color_from_depth(const ConfigNode& node, Camera& camera, ConfigProblem
     return;
   }
 
+  // Orthonormal, right-handed, homogeneous
   const Eigen::Matrix3d r = matrix->topLeftCorner<3, 3>();
   const double error = (r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   const bool last_row = (matrix->row(3) - Eigen::RowVector4d(0, 0, 0, 1)).cwiseAbs().maxCoeff() < 1e-9;
@@ -115,6 +120,7 @@ struct LensKeys {
   [[nodiscard]] Lens lens(const ConfigNode& map, const std::string& path, ConfigProblems& problems) const;
 };
 
+/// Checks the number of coefficients against the model.
 Lens LensKeys::lens(const ConfigNode& map, const std::string& path, ConfigProblems& problems) const {
   Lens lens;
   if (model != "pinhole") lens.model = LensModel::kEquidistant;
@@ -134,10 +140,10 @@ Lens LensKeys::lens(const ConfigNode& map, const std::string& path, ConfigProble
 }
 
 void read_depth_camera(const ConfigNode& root, Camera& camera, ConfigProblems& problems) {
+  // Size and pose belong together
   const ConfigNode* transform = root.find("color_from_depth");
   const ConfigNode* depth = root.find("depth");
   if (transform != nullptr) read_color_from_depth(*transform, camera, problems);
-
   if (transform != nullptr && depth == nullptr) {
     problems.push_back(
         {transform->mark, "depth",
@@ -145,22 +151,22 @@ void read_depth_camera(const ConfigNode& root, Camera& camera, ConfigProblems& p
   }
   if (depth == nullptr) return;
 
+  // Intrinsics without a pose
   if (transform == nullptr) {
     problems.push_back({depth->mark, "color_from_depth",
                         "is missing: a separate depth camera needs its pose (4x4, metres)"});
   }
-
   if (depth->kind != ConfigNode::Kind::kMap) {
     problems.push_back({depth->mark, "depth", "must hold the keys width height fx fy cx cy"});
     return;
   }
 
+  // The same keys as the colour camera's
   Pinhole pinhole;
   LensKeys lens;
   core::OptionTable table;
   declare_pinhole(table, pinhole);
   lens.declare(table);
-
   table.set_all(*depth, "depth", problems);
   check_pinhole(*depth, pinhole, "depth", problems);
   camera.depth = pinhole;
@@ -204,6 +210,7 @@ std::vector<std::pair<const char*, double*>> sigma_keys(CameraSigma& sigma) {
           {"depth_delay", &sigma.depth_delay_s}};
 }
 
+/// Standard deviations of the calibration, by key.
 void read_sigma(const ConfigNode& root, CameraSigma& sigma, ConfigProblems& problems) {
   const ConfigNode* node = root.find("sigma");
   if (node == nullptr) return;
@@ -229,8 +236,8 @@ std::string sigma_yaml(CameraSigma sigma) {
 }
 
 core::Result<Camera> camera_in(core::Result<ConfigNode> root, const std::filesystem::path& file) {
+  // Only a map of keys is a camera file
   if (!root) return tl::unexpected(root.error());
-
   ConfigProblems problems;
   if (root->kind != ConfigNode::Kind::kMap && root->kind != ConfigNode::Kind::kNull) {
     problems.push_back({root->mark, "", "is not a camera file: expected lines such as 'fx: 525.0'"});
@@ -238,6 +245,7 @@ core::Result<Camera> camera_in(core::Result<ConfigNode> root, const std::filesys
   }
   if (root->mark.file.empty()) root->mark = {file.string(), 1, 1};
 
+  // Keys of the colour camera
   Camera camera;
   LensKeys lens;
   core::OptionTable table;
@@ -247,10 +255,12 @@ core::Result<Camera> camera_in(core::Result<ConfigNode> root, const std::filesys
   table.number("depth_scale", camera.depth_scale, {1e-3, 1e7}, "", "Raw depth units per metre");
   table.number("fps", camera.fps, {1e-3, 1e4}, "", "Pairs a second");
 
+  // Readout of a rolling shutter
   double readout_s = 0.0;
   table.number("readout", readout_s, {0.0, 0.1}, "s",
                "Time from the first to the last row of an image; 0: all at once");
 
+  // Corrections of depth images
   std::vector<double> slope(2, 0.0);
   table.numbers("depth_slope", slope, 2, {-0.2, 0.2}, "1/m",
                 "Slope along x and y: added to 1 / depth on the ray (x, y, 1)");
@@ -259,6 +269,7 @@ core::Result<Camera> camera_in(core::Result<ConfigNode> root, const std::filesys
   if (root->kind == ConfigNode::Kind::kMap)
     table.set_all(*root, "", problems, {"color_from_depth", "depth", "sigma"});
 
+  // Relations between keys
   check_pinhole(*root, camera.color, "", problems);
   const Lens color_lens = lens.lens(*root, "", problems);
   camera.model = color_lens.model;
@@ -268,6 +279,7 @@ core::Result<Camera> camera_in(core::Result<ConfigNode> root, const std::filesys
   read_depth_camera(*root, camera, problems);
   read_sigma(*root, camera.sigma, problems);
 
+  // All problems are reported at once
   if (!problems.empty()) return tl::unexpected(core::to_error(problems));
   if (camera.name.empty()) camera.name = file.stem().string();
   return camera;
@@ -284,27 +296,32 @@ core::Result<Camera> parse_camera(const std::string& text, const std::string& fi
 }
 
 std::string to_yaml(const Camera& camera) {
+  // Keys that every camera has
   std::string text = camera.name.empty() ? "" : fmt::format("name: {}\n", text_yaml(camera.name));
   text += fmt::format("model: {}\n", model_name(camera.model)) + pinhole_yaml(camera.color, "");
   text += lens_yaml(camera.lens(), "");
   text += fmt::format("depth_scale: {}  # raw units per metre\nfps: {}\n", camera.depth_scale, camera.fps);
 
+  // Keys that few cameras need
   if (camera.readout_s) {
     text += fmt::format("readout: {}  # s from the first row of an image to the last; 0: all at once\n",
                         *camera.readout_s);
   }
 
+  // A slope corrects the depth
   if (camera.depth_slope != std::array<double, 2>{}) {
     text += fmt::format("depth_slope: [{}, {}]  # 1/m along x, y: added to 1 / depth on the ray (x, y, 1)\n",
                         camera.depth_slope[0], camera.depth_slope[1]);
   }
 
+  // A delay of the depth sensor
   if (camera.depth_delay_s != 0.0) {
     text += fmt::format("depth_delay: {}  # s that depth images were taken later than their stamps say\n",
                         camera.depth_delay_s);
   }
   text += sigma_yaml(camera.sigma);
 
+  // A separate depth camera
   if (camera.color_from_depth && camera.depth) {
     const Eigen::Matrix4d m = camera.color_from_depth->isometry().matrix();
     text += "color_from_depth:\n";
@@ -312,13 +329,13 @@ std::string to_yaml(const Camera& camera) {
       text += fmt::format("  - [{}, {}, {}, {}]\n", m(r, 0), m(r, 1), m(r, 2), m(r, 3));
     }
 
+    // Its intrinsics and lens
     text += "depth:\n" + pinhole_yaml(*camera.depth, "  ");
     if (camera.depth_lens.distorts()) {
       text += fmt::format("  model: {}\n", model_name(camera.depth_lens.model));
       text += lens_yaml(camera.depth_lens, "  ");
     }
   }
-
   return text;
 }
 

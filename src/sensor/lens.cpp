@@ -38,6 +38,7 @@ struct Bent {
 
 constexpr double kAxis = 1e-8;  // rays nearer to the axis are not bent
 
+/// Derivative of the distorted point by the ray.
 Eigen::Matrix2d radial_tangential_jacobian(const Distortion& k, const Eigen::Vector2d& ray) {
   const double x = ray.x();
   const double y = ray.y();
@@ -52,6 +53,7 @@ Eigen::Matrix2d radial_tangential_jacobian(const Distortion& k, const Eigen::Vec
   return j;
 }
 
+/// Derivative of the equidistant projection; the identity on the axis.
 Eigen::Matrix2d equidistant_jacobian(const Distortion& k, const Eigen::Vector2d& ray) {
   const double r = ray.norm();
   if (r < kAxis) return Eigen::Matrix2d::Identity();
@@ -61,6 +63,7 @@ Eigen::Matrix2d equidistant_jacobian(const Distortion& k, const Eigen::Vector2d&
   return scale * Eigen::Matrix2d::Identity() + scale_by_r / r * ray * ray.transpose();
 }
 
+/// The ray of a distorted point, by Newton's method on the angle.
 Eigen::Vector2d equidistant_inverse(const Distortion& k, const Eigen::Vector2d& distorted) {
   constexpr int kSteps = 20;
   constexpr double kSteepest = 1.55;  // rad off the axis: beyond, a pinhole image has no pixels
@@ -84,6 +87,7 @@ bool Lens::distorts() const {
          std::any_of(k.begin(), k.end(), [](double c) { return c != 0.0; });
 }
 
+/// The ray's point on the image plane at depth 1, as the lens shows it.
 Eigen::Vector2d Lens::distort(const Eigen::Vector2d& ray) const {
   if (model == LensModel::kEquidistant) {
     const double r = ray.norm();
@@ -101,6 +105,7 @@ Eigen::Matrix2d Lens::jacobian(const Eigen::Vector2d& ray) const {
   return model == LensModel::kEquidistant ? equidistant_jacobian(k, ray) : radial_tangential_jacobian(k, ray);
 }
 
+/// Derivative by k1 along the ray, and the ratio of k2's to it.
 Lens::ByCoefficients Lens::by_coefficients(const Eigen::Vector2d& ray) const {
   if (model == LensModel::kRadialTangential) {
     const double r2 = ray.squaredNorm();
@@ -112,6 +117,7 @@ Lens::ByCoefficients Lens::by_coefficients(const Eigen::Vector2d& ray) const {
   return {theta * theta * theta / r, theta * theta};
 }
 
+/// Newton's method from the distorted point.
 Eigen::Vector2d Lens::undistort(const Eigen::Vector2d& distorted) const {
   if (model == LensModel::kEquidistant) return equidistant_inverse(k, distorted);
   constexpr int kSteps = 8;

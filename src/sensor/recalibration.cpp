@@ -44,12 +44,15 @@ double ImageModel::true_depth(const Eigen::Vector2d& rectified, double measured)
   return shrink > 0.1 ? measured / shrink : 0.0;
 }
 
+/// Shifts of pixels on a coarse grid; none if the lens stays.
 Recalibration::Recalibration(const Pinhole& image, const Camera& before, const Camera& after)
     : before_(image, before), after_(image, after) {
   moves_pixels_ = before.lens() != after.lens() || !same(before.color, after.color);
   moves_depth_ = before.depth_slope != after.depth_slope ||
                  (moves_pixels_ && !(before.color_from_depth && before.depth));
   if (!moves_pixels_) return;
+
+  // The grid reaches beyond the image's far sides
   columns_ = image.width / kCell + 2;
   rows_ = image.height / kCell + 2;
   shifts_.reserve(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
@@ -61,6 +64,7 @@ Recalibration::Recalibration(const Pinhole& image, const Camera& before, const C
   }
 }
 
+/// Bilinear interpolation of the grid's shifts.
 Eigen::Vector2d Recalibration::pixel(const Eigen::Vector2d& rectified) const {
   if (!moves_pixels_) return rectified;
   const double x = std::clamp(rectified.x() / kCell, 0.0, columns_ - 1.0);
@@ -82,6 +86,7 @@ double Recalibration::depth(const Eigen::Vector2d& before, const Eigen::Vector2d
   return after_.true_depth(now, before_.measured_depth(before, z));
 }
 
+/// The pixel moves with the lens, the depth with the slope.
 Eigen::Vector3d Recalibration::point(const Eigen::Vector3d& p) const {
   if (!moves_depth_ || !(p.z() > 0.0)) return p;
   const Pinhole& image = before_.image();

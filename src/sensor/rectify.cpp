@@ -88,6 +88,7 @@ double surface_slope(std::uint16_t here, std::uint16_t before, std::uint16_t aft
   return level_back ? back : level_ahead ? ahead : 0.0;
 }
 
+/// Change of depth from pixel to pixel along x and y.
 Eigen::Vector2d surface_slope(const cv::Mat& raw, int u, int v) {
   const auto at = [&raw](int x, int y) {
     const bool inside = x >= 0 && y >= 0 && x < raw.cols && y < raw.rows;
@@ -112,6 +113,7 @@ struct Rectifier::Maps {
   std::vector<std::int32_t> nearest;  ///< source pixel of every target pixel, -1 outside
   std::vector<LensRay> depth_rays;    ///< rays of all depth pixels, if the lens distorts
 
+  /// Computes only the tables that the camera needs.
   Maps(const Camera& c, const Pinhole& t) : camera(c), target(t) {
     if (camera.color_from_depth && camera.depth && camera.depth_lens.distorts()) fill_depth_rays();
     if (!moves_pixels()) return;
@@ -144,6 +146,7 @@ struct Rectifier::Maps {
            p.cy != target.cy;
   }
 
+  /// The source pixel of each rectified pixel; -1 outside the image.
   void fill_nearest(const cv::Mat& x, const cv::Mat& y) {
     nearest.reserve(x.total());
     for (int v = 0; v < x.rows; ++v) {
@@ -181,6 +184,7 @@ cv::Mat Rectifier::Maps::converted(const cv::Mat& raw) const {
   return out;
 }
 
+/// Takes the nearest pixel: means across an edge would invent depth.
 cv::Mat Rectifier::Maps::undistorted(const cv::Mat& raw) const {
   const cv::Mat source = raw.isContinuous() ? raw : raw.clone();
   cv::Mat out(raw.size(), CV_32FC1);
@@ -200,6 +204,7 @@ Rectifier::Maps::LensRay Rectifier::Maps::lens_ray(int u, int v) const {
   return {*ray, 0.5 * by_lens.cwiseAbs() * Eigen::Vector2d(1.0 / d.fx, 1.0 / d.fy)};
 }
 
+/// The ray of a depth pixel and half its width, at depth 1.
 Eigen::Vector3d Rectifier::Maps::ray_of(int u, int v, Eigen::Vector2d& half) const {
   const Pinhole& d = *camera.depth;
   if (depth_rays.empty()) {
@@ -216,12 +221,14 @@ Eigen::Vector3d Rectifier::Maps::ray_of(int u, int v, Eigen::Vector2d& half) con
 /// nearest surface wins. Rectangles of neighbours on one surface meet, so a change of resolution tears no
 /// holes, and where each covers several pixels it is tilted as the surface is.
 cv::Mat Rectifier::Maps::registered(const cv::Mat& raw) const {
+  // A depth pixel may cover several colour pixels
   constexpr double kSlack_px = 0.25;  // closes the seams that parallax opens between neighbours on a slope
   constexpr double kCoarse = 1.5;     // pixels that a depth pixel covers
   const Pinhole& c = target;
   const bool coarse = c.fx > kCoarse * camera.depth->fx;
   const auto scale = static_cast<float>(camera.depth_scale);
 
+  // Each depth pixel becomes a patch
   cv::Mat out = cv::Mat::zeros(c.height, c.width, CV_32FC1);
   for (int v = 0; v < raw.rows; ++v) {
     const auto* from = raw.ptr<std::uint16_t>(v);
@@ -229,11 +236,13 @@ cv::Mat Rectifier::Maps::registered(const cv::Mat& raw) const {
       const double z_depth = static_cast<double>(metres(from[u], scale));
       if (z_depth <= 0.0) continue;
 
+      // Transformed to the colour camera
       Eigen::Vector2d half;
       const Eigen::Vector3d ray = ray_of(u, v, half);
       const Eigen::Vector3d p = *camera.color_from_depth * (z_depth * ray);
       if (p.z() <= 1e-3 || half.x() == 0.0) continue;
 
+      // A patch as large as the pixel's square there
       const Eigen::Vector2d focal(c.fx, c.fy);
       DepthPatch patch;
       patch.centre = c.project(p);
@@ -263,6 +272,7 @@ cv::Mat Rectifier::color(const cv::Mat& raw) const {
   return out;
 }
 
+/// Depth in metres, aligned with the rectified colour image.
 cv::Mat Rectifier::depth(const cv::Mat& raw16) const {
   const Camera& camera = maps_->camera;
   const bool own_camera = camera.color_from_depth && camera.depth;

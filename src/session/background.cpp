@@ -29,6 +29,7 @@ OpenCvThreads::~OpenCvThreads() {
 }
 
 Background::Background(core::StopToken stop, Work work) : stop_(std::move(stop)) {
+  // The result is stored before anybody is woken
   thread_ = std::thread([this, work = std::move(work)] {
     auto result = guarded(work);
 

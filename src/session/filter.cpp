@@ -11,6 +11,7 @@ namespace plumbline {
 core::Result<cloud::FilterChain> session::load_chain(const std::string& chain,
                                                      const cloud::FilterRegistry& filters,
                                                      const std::filesystem::path& pipelines_folder) {
+  // A text that begins with a bracket is a list of filters, any other one names a file
   if (chain.rfind('[', 0) != 0) {
     return find_pipelines(pipelines_folder)
         .and_then(
@@ -18,6 +19,7 @@ core::Result<cloud::FilterChain> session::load_chain(const std::string& chain,
         .and_then([&](const auto& file) { return cloud::FilterChain::load(file, filters); });
   }
 
+  // The list may come from a user, so all its problems are reported
   const auto list = core::parse_yaml(chain, "filters");
   if (!list) return tl::unexpected(list.error());
   core::ConfigProblems problems;
@@ -28,6 +30,7 @@ core::Result<cloud::FilterChain> session::load_chain(const std::string& chain,
 
 core::Result<cloud::CloudPtr> filter(const cloud::CloudConstPtr& cloud, const std::string& chain,
                                      const RunOptions& options) {
+  // Exceptions of the libraries become errors of the result
   return session::guarded([&]() -> core::Result<cloud::CloudPtr> {
     const auto filters = session::load_chain(chain, options.filters, options.pipelines_folder);
     if (!filters) return tl::unexpected(filters.error());

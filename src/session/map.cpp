@@ -26,6 +26,7 @@ core::Error as_error(const std::exception& problem) {
   return error;
 }
 
+/// The output folder; without a name a temporary one, removed when the last owner is gone.
 core::Result<Place> place_of(const fs::path& output) {
   if (!output.empty()) return Place{output, nullptr};
   std::error_code ec;
@@ -35,6 +36,7 @@ core::Result<Place> place_of(const fs::path& output) {
                                           std::generic_category().message(errno)));
   }
 
+  // Removed together with the last result that reads it
   const auto remove = [](fs::path* made) {
     std::error_code ignored;
     fs::remove_all(*made, ignored);
@@ -55,6 +57,7 @@ core::Result<void> fill(pipeline::RunRequest& request, const RunOptions& options
   return {};
 }
 
+/// Options of a recording as the reader takes them; unknown names are errors.
 core::Result<dataset::OpenOptions> open_options(const RecordingOptions& options, const fs::path& pipelines) {
   dataset::OpenOptions open;
   open.format = options.format;
@@ -64,6 +67,7 @@ core::Result<dataset::OpenOptions> open_options(const RecordingOptions& options,
   open.to_s = options.to_s.value_or(open.to_s);
   open.every = options.every;
 
+  // Poses of the recording: prior, truth or unused
   const std::map<std::string, dataset::PoseUse> uses{{"prior", dataset::PoseUse::kPrior},
                                                      {"given", dataset::PoseUse::kGiven},
                                                      {"ignore", dataset::PoseUse::kIgnore}};
@@ -72,6 +76,7 @@ core::Result<dataset::OpenOptions> open_options(const RecordingOptions& options,
     return core::usage_error("poses: there is no '" + options.poses + "' (allowed: prior, given, ignore)");
   open.poses = use->second;
 
+  // Topics are given by the kind of their messages
   const std::map<std::string, std::string*> names{{"color", &open.topics.color},
                                                   {"depth", &open.topics.depth},
                                                   {"info", &open.topics.info},
@@ -87,6 +92,7 @@ core::Result<dataset::OpenOptions> open_options(const RecordingOptions& options,
   return open;
 }
 
+/// Maps on a thread pool, with OpenCV's threads turned off and exceptions as errors.
 core::Result<pipeline::RunSummary> run_map(const pipeline::MapRequest& request, const RunOptions& options) {
   return guarded([&] {
     const OpenCvThreads one;
@@ -96,6 +102,7 @@ core::Result<pipeline::RunSummary> run_map(const pipeline::MapRequest& request, 
   });
 }
 
+/// A request from the options; given poses and a known map have pipelines made for them.
 core::Result<pipeline::RunSummary> run_map(const std::string& input, const fs::path& output,
                                            const MapOptions& options) {
   pipeline::MapRequest request;
@@ -103,6 +110,7 @@ core::Result<pipeline::RunSummary> run_map(const std::string& input, const fs::p
   if (!options.known_map.empty()) request.pipeline = "localize";
   if (auto filled = fill(request, options, output); !filled) return tl::unexpected(filled.error());
 
+  // Recording and its cameras
   auto open = open_options(options, request.pipelines_folder);
   if (!open) return tl::unexpected(open.error());
   request.open = std::move(*open);
@@ -114,6 +122,7 @@ core::Result<pipeline::RunSummary> run_map(const std::string& input, const fs::p
   return run_map(request, options);
 }
 
+/// Fuses finished maps as `plumbline fuse` does.
 core::Result<pipeline::RunSummary> run_fuse(const std::vector<fs::path>& maps, const fs::path& output,
                                             const FuseOptions& options) {
   return guarded([&]() -> core::Result<pipeline::RunSummary> {
@@ -133,6 +142,7 @@ core::Result<pipeline::RunSummary> run_fuse(const std::vector<fs::path>& maps, c
 
 core::Result<Result> map(const std::string& input, const std::filesystem::path& output,
                          const MapOptions& options) {
+  // A temporary folder lives as long as its result
   return session::guarded([&] {
     return session::place_of(output).and_then([&](const session::Place& place) {
       return session::run_map(input, place.output, options).and_then([&](const pipeline::RunSummary&) {
@@ -144,6 +154,7 @@ core::Result<Result> map(const std::string& input, const std::filesystem::path& 
 
 core::Result<Result> fuse(const std::vector<std::filesystem::path>& maps, const std::filesystem::path& output,
                           const FuseOptions& options) {
+  // A temporary folder lives as long as its result
   return session::guarded([&] {
     return session::place_of(output).and_then([&](const session::Place& place) {
       return session::run_fuse(maps, place.output, options).and_then([&](const pipeline::RunSummary&) {

@@ -53,6 +53,7 @@ struct Mapper::Impl {
         run(given.stop, [this] { return work(); }) {}
   ~Impl() { live->abandon(); }
 
+  /// Runs the mapping of the frames that are pushed; called on the background thread.
   core::Result<pipeline::RunSummary> work() {
     pipeline::MapRequest request;
     if (auto filled = session::fill(request, options, place.output); !filled)
@@ -79,6 +80,7 @@ Mapper::~Mapper() = default;
 
 core::Result<Mapper> Mapper::start(const sensor::Camera& camera, const std::filesystem::path& output,
                                    const MapperOptions& options) {
+  // Wrong arguments are reported before the thread begins
   return session::guarded([&]() -> core::Result<Mapper> {
     if (const std::string problem = sensor::camera_problem(camera); !problem.empty())
       return core::usage_error("camera: " + problem);
@@ -91,6 +93,7 @@ core::Result<Mapper> Mapper::start(const sensor::Camera& camera, const std::file
 
 core::Result<std::optional<std::size_t>> Mapper::push(const Frame& frame) {
   return session::guarded([&]() -> core::Result<std::optional<std::size_t>> {
+    // A full queue drops the frame or makes the caller wait
     bool room = false;
     while (!room && !impl_->run.done()) {
       room = wait_for_room(impl_->options.drop_late ? 0.0 : kAgain_s);
@@ -99,6 +102,7 @@ core::Result<std::optional<std::size_t>> Mapper::push(const Frame& frame) {
       return std::nullopt;
     }
 
+    // A run that has ended tells its own error first
     if (impl_->run.done()) {
       if (const auto ended = impl_->run.result(); !ended) return tl::unexpected(ended.error());
       return core::input_error("the run has ended and accepts no more frames");
@@ -123,6 +127,7 @@ bool Mapper::wait(double seconds) const { return impl_->run.wait(seconds); }
 
 core::Result<Result> Mapper::finish() {
   return session::guarded([&] {
+    // The run finishes the frames that were pushed
     close();
     while (!wait(1.0)) continue;
     return impl_->run.result().and_then(

@@ -50,6 +50,8 @@ core::Result<sensor::Camera> find_camera(const std::string& name_or_file, const 
   if (!folder) return tl::unexpected(folder.error());
   auto reading = sensor::find_camera(name_or_file, *folder / "cameras");
   if (!reading) return tl::unexpected(reading.error());
+
+  // Calibrations of other programs may lack the image size
   if (reading->has_size) return std::move(reading->camera);
   return core::usage_error(name_or_file +
                            ": the file does not tell the size of the images; write a camera.yaml");

@@ -30,18 +30,21 @@ std::optional<T> value_at(const Json& summary, const char* place) {
   return summary.at(pointer).get<T>();
 }
 
+/// The verdict of summary.json; values that an older version did not write stay unknown.
 Verdict verdict_of(const Json& summary) {
   Verdict verdict;
   verdict.trustworthy = value_at<bool>(summary, "/trustworthy").value_or(false);
   verdict.reason = value_at<std::string>(summary, "/reason").value_or("");
   verdict.sentence = value_at<std::string>(summary, "/verdict/sentence").value_or("");
 
+  // Accuracy that the run expects from its own checks
   verdict.expected_m = value_at<double>(summary, "/verdict/accuracy/expected_m");
   verdict.p95_m = value_at<double>(summary, "/verdict/accuracy/p95_m");
   verdict.lengths = value_at<double>(summary, "/verdict/accuracy/lengths");
   verdict.unchecked =
       value_at<std::vector<std::string>>(summary, "/verdict/unchecked").value_or(verdict.unchecked);
 
+  // Share of the recording that was tracked
   verdict.tracked = value_at<double>(summary, "/verdict/coverage/tracked").value_or(0.0);
   verdict.lost_s = value_at<double>(summary, "/verdict/coverage/lost_s").value_or(0.0);
   return verdict;
@@ -88,10 +91,12 @@ core::Result<Result> Result::open(const fs::path& folder, std::shared_ptr<void> 
     const auto summary = core::read_json(result->summary());
     if (!summary) return tl::unexpected(summary.error());
 
+    // The last owner removes a temporary folder
     auto impl = std::make_shared<Impl>();
     impl->result = std::move(*result);
     impl->kept = std::move(kept);
 
+    // Other versions may store values of other types
     try {
       impl->verdict = verdict_of(*summary);
       impl->sigma_note = value_at<std::string>(*summary, "/refine/sigma_note").value_or("");
@@ -127,6 +132,7 @@ core::Result<geometry::Trajectory> Result::path(const std::string& robot) const 
 core::Result<sensor::Camera> Result::camera(const std::string& robot) const {
   return session::guarded([&] {
     return impl_->folder_of(robot).and_then([&](const fs::path& folder) {
+      // A robot of a joint map may have a camera file in its own folder
       const fs::path own = folder / "camera.yaml";
       return sensor::read_camera(fs::exists(own) ? own : impl_->result.folder / "camera.yaml");
     });
@@ -139,13 +145,17 @@ core::Result<std::vector<Keyframe>> Result::keyframes() const {
     if (!run) return tl::unexpected(run.error());
     const auto fusion = run->fusion_state();
     if (!fusion) return tl::unexpected(fusion.error());
+
+    // Names of the robots by number
     std::map<std::int32_t, std::string> names;
     for (const maps::RobotInfo& robot : run->stored().header.robots) names[robot.number] = robot.name;
 
+    // Poses in the order of the store
     std::vector<Keyframe> all;
     for (const maps::KeyframePose& pose : run->keyframes()) {
       Keyframe keyframe{names[pose.id.robot], pose.id.index, pose.stamp, pose.world_from_camera, {}, {}};
 
+      // Covariances exist for keyframes that the last adjustment reached
       const auto known = fusion->covariances.find({pose.id.robot, pose.stamp});
       if (known != fusion->covariances.end() && known->second.allFinite())
         keyframe.covariance = in_world(known->second, pose.world_from_camera);

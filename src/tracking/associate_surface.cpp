@@ -27,16 +27,16 @@ float depth_at(const cv::Mat& depth, double u, double v) {
 }  // namespace
 
 std::vector<optimize::PlaneTerm> associate_surface(const std::vector<WorldSurface>& surface,
-                                                   const cv::Mat& depth, const sensor::Pinhole& camera,
-                                                   const geometry::Rigid3& camera_from_world,
-                                                   const geometry::Rigid3& depth_from_camera,
+                                                   const PosedDepth& posed,
                                                    const SurfaceAssociationOptions& options, int* in_view) {
+  const cv::Mat& depth = posed.depth;
+  const sensor::Pinhole& camera = posed.camera;
   std::vector<optimize::PlaneTerm> terms;
   if (in_view != nullptr) *in_view = 0;
   if (depth.empty() || surface.empty()) return terms;
 
-  const geometry::Rigid3 depth_from_world = depth_from_camera * camera_from_world;
-  const geometry::Rigid3 camera_from_depth = depth_from_camera.inverse();
+  const geometry::Rigid3 depth_from_world = posed.depth_from_camera * posed.camera_from_world;
+  const geometry::Rigid3 camera_from_depth = posed.depth_from_camera.inverse();
   const geometry::Rigid3 world_from_depth = depth_from_world.inverse();
   terms.reserve(static_cast<std::size_t>(options.max_samples));
 
@@ -54,6 +54,7 @@ std::vector<optimize::PlaneTerm> associate_surface(const std::vector<WorldSurfac
     const double cosine = -normal.dot(p) / p.norm();
     if (cosine < 0.25) continue;
 
+    // The measured point, near the sample's tangent plane
     const double z = depth_at(depth, pixel.x(), pixel.y());
     if (!(z > 0.25) || z > options.max_depth_m) continue;
     if (in_view != nullptr) ++*in_view;
@@ -61,6 +62,7 @@ std::vector<optimize::PlaneTerm> associate_surface(const std::vector<WorldSurfac
     const double distance = s.normal.dot(world_from_depth * measured - s.point);
     if (std::abs(distance) > options.max_distance_m) continue;
 
+    // Noise of the measurement and of the map
     const double measured_sigma = sensor::depth_sigma(z) * std::max(0.3, -normal.z());
     terms.push_back({camera_from_depth * measured, s.point, s.normal,
                      std::sqrt(measured_sigma * measured_sigma + s.sigma * s.sigma)});

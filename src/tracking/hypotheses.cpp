@@ -52,6 +52,7 @@ Tracker::PoseHypotheses Tracker::pose_hypotheses(const maps::Map& map, const sen
     result.searched = seen.has_value();
   }
 
+  // Most reliable first: sensors, thumbnails, motion model
   const bool sensed = motion_.knows_turn() || motion_.knows_wheels();
   if (sensed) result.camera_from_world.push_back(predicted);
   if (options_.thumbnails) {
@@ -62,21 +63,24 @@ Tracker::PoseHypotheses Tracker::pose_hypotheses(const maps::Map& map, const sen
 
   if (!sensed) result.camera_from_world.push_back(predicted);
   result.camera_from_world.push_back(last);
+
+  // Intensity may show which one is the best
   if (options_.photometric && features.photometric != nullptr)
     rank_by_intensity(map, {features.photometric.get(), &frame.depth, {}, camera_}, result);
   return result;
 }
 
 /// In front of a bare wall thumbnails fit anywhere, and the motion model lags behind: fine texture shows
-/// which hypothesis is the best, or how far to the side of it the camera looks.
+/// which hypothesis is the best, or how far to the side of it the camera points.
 void Tracker::rank_by_intensity(const maps::Map& map, const PhotometricView& view,
                                 PoseHypotheses& hypotheses) const {
   constexpr std::size_t kCoarse = 1;
   constexpr double kSure = 0.3;  // smallest correlation of a shifted pose
   std::vector<Rigid3>& poses = hypotheses.camera_from_world;
   std::vector<std::optional<double>> agreement;
-
   std::vector<std::optional<optimize::PhotometricFamily>> families;
+
+  // Agreement of each hypothesis with a keyframe's intensity
   for (const Rigid3& pose : poses) {
     const auto& family =
         families.emplace_back(comparable(photometric_, map, local_map_.keyframes, kCoarse, view, pose));
@@ -85,6 +89,7 @@ void Tracker::rank_by_intensity(const maps::Map& map, const PhotometricView& vie
                             : std::nullopt);
   }
 
+  // The best one comes first
   const std::size_t best = best_hypothesis(agreement);
   const Rigid3 likeliest = poses[best];
   if (best > 0) {
@@ -93,13 +98,14 @@ void Tracker::rank_by_intensity(const maps::Map& map, const PhotometricView& vie
   }
   if (!families[best] || *agreement[best] >= kGoodAgreement) return;
 
+  // None is good: search around the best one
   const ShiftedPose shifted = search_shift(*families[best], likeliest);
   if (shifted.correlation < std::max(kSure, *agreement[best] + kBetterAgreement)) return;
   poses.insert(poses.begin(), shifted.camera_from_world);
   hypotheses.searched = true;
 }
 
-/// Terms that bear a pose out, each family with its weight.
+/// Terms that confirm a pose, each family with its weight.
 double Tracker::support(const TrackResult& result) const {
   const optimize::PoseSummary& seen = result.estimate;
   const optimize::PoseSolverOptions& weights = options_.solver;
@@ -131,8 +137,8 @@ std::optional<TrackResult> Tracker::track_with_motion_model(const maps::Map& map
   std::optional<TrackResult> best;
   for (const Rigid3& hypothesis : hypotheses.camera_from_world) {
     TrackResult attempt = align(map, image, hypothesis, motion_.search_radius_px());
-    // Among look-alikes, the keys of a keyboard, wrong matches of the wide search can pull the pose further
-    // than the fine rounds look: the right ones around the hypothesis would never be tried.
+    // Among similar landmarks, such as the keys of a keyboard, wrong matches of the wide search can pull the
+    // pose beyond the reach of the fine rounds: the right ones around the hypothesis would never be tried.
     if (jumps(image.frame.stamp, attempt.camera_from_world)) {
       TrackResult near = align(map, image, hypothesis, 0.0);
       if (tracked(near) && !(tracked(attempt) && support(attempt) > kClearly * support(near)))
@@ -157,6 +163,7 @@ std::vector<Tracker::PlaceHypothesis> Tracker::place_hypotheses(
 
   std::vector<PlaceHypothesis> hypotheses;
   if (options_.points && !features.points.empty()) {
+    // From the local map, place recognition and thumbnails
     std::vector<core::KeyframeId> candidates;
     const auto add = [&candidates](core::KeyframeId id) {
       if (std::find(candidates.begin(), candidates.end(), id) == candidates.end()) candidates.push_back(id);
@@ -166,12 +173,13 @@ std::vector<Tracker::PlaceHypothesis> Tracker::place_hypotheses(
     if (find_places_) {
       for (core::KeyframeId id : find_places_(features)) add(id);
     }
-
     for (const LookAlike& a : alike) add(a.keyframe);
+
     const auto seen = tracking::relocalise(map, candidates, features, camera_, options_.min_inliers);
     if (seen) hypotheses.push_back({seen->keyframe, seen->camera_from_world, false});
   }
 
+  // Poses from the most similar thumbnails are coarse
   for (std::size_t i = 0; i < std::min(kAligned, alike.size()); ++i) {
     const core::KeyframeId id = alike[i].keyframe;
     hypotheses.push_back({id, align_look_alike(map, id, features, camera_), true});
@@ -184,6 +192,8 @@ std::optional<TrackResult> Tracker::relocalise(const maps::Map& map, const Track
   const features::FrameFeatures& features = *image.synchronised;
   const std::vector<PlaceHypothesis> hypotheses = place_hypotheses(map, features);
   LocalMap before = std::move(local_map_);
+
+  // The first place that passes all checks
   for (const PlaceHypothesis& place : hypotheses) {
     local_map_ = build_local_map(map, place.keyframe, options_.local_map);
     TrackResult attempt = align(map, image, place.camera_from_world, place.coarse ? 24.0 : 10.0);

@@ -35,8 +35,9 @@ std::vector<WorldSurface> fuse_voxels(const std::vector<WorldSurface>& samples, 
   cloud::CellMap<std::size_t> index;
   index.reserve(samples.size());
   std::vector<WorldSurface> fused;
-
   std::vector<double> weights;
+
+  // Sums, weighted by inverse variance
   for (const WorldSurface& s : samples) {
     const double w = 1.0 / (s.sigma * s.sigma);
     const auto [found, inserted] = index.try_emplace(voxel_of(s, voxel_m), fused.size());
@@ -53,6 +54,7 @@ std::vector<WorldSurface> fuse_voxels(const std::vector<WorldSurface>& samples, 
     weights[found->second] += w;
   }
 
+  // Means; part of the noise is common to neighbours
   for (std::size_t i = 0; i < fused.size(); ++i) {
     fused[i].point /= weights[i];
     fused[i].normal.normalize();
@@ -73,6 +75,7 @@ std::vector<WorldSurface> collect_surface(const maps::Map& map, const std::vecto
     world_from_keyframe.push_back(map.camera_from_world(id).inverse());
   }
 
+  // The keyframes' samples in turn
   for (std::size_t i = 0; i < longest; ++i) {
     for (std::size_t k = 0; k < keyframes.size(); ++k) {
       const auto& surface = map.keyframe(keyframes[k]).surface;
@@ -105,9 +108,10 @@ LocalMap build_local_map(const maps::Map& map, KeyframeId reference, const Local
   const auto wanted = static_cast<std::size_t>(options.keyframes);
   for (const KeyframeId id : map.neighbours(reference, wanted - 1)) append_unique(local.keyframes, id);
 
-  // Poses of other components say nothing of where their keyframes lie.
+  // Poses of other components are in another frame.
   const KeyframeId root = maps::root_of(map, reference);
 
+  // Recent keyframes that may overlap
   const geometry::Rigid3& reference_from_world = map.camera_from_world(reference);
   for (std::int32_t index = reference.index - 1; index >= 0 && index > reference.index - 40; --index) {
     if (local.keyframes.size() >= wanted) break;
@@ -119,6 +123,7 @@ LocalMap build_local_map(const maps::Map& map, KeyframeId reference, const Local
     }
   }
 
+  // Landmarks of all, surfaces of overlapping keyframes
   local.points = map.points_seen_by(local.keyframes);
   local.lines = map.lines_seen_by(local.keyframes);
   std::vector<KeyframeId> dense;

@@ -50,6 +50,8 @@ std::vector<LookAlike> look_alikes(const maps::Map& map, const std::vector<core:
     const double score = correlation(current, coarse(thumbnail));
     if (score >= kMinAlike) alike.push_back({id, score});
   }
+
+  // The most similar first
   std::stable_sort(alike.begin(), alike.end(),
                    [](const LookAlike& a, const LookAlike& b) { return a.correlation > b.correlation; });
   if (alike.size() > static_cast<std::size_t>(count)) alike.resize(static_cast<std::size_t>(count));

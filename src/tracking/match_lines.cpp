@@ -33,6 +33,7 @@ struct LineCandidate {
   float length = 0.0F;
 };
 
+// Direction, middle and length of each line, computed once.
 std::vector<LineCandidate> candidates_of(const features::FrameFeatures& frame) {
   std::vector<LineCandidate> candidates;
   candidates.reserve(frame.lines.size());
@@ -45,23 +46,25 @@ std::vector<LineCandidate> candidates_of(const features::FrameFeatures& frame) {
 }  // namespace
 
 std::vector<LineMatch> match_lines(const maps::Map& map, const std::vector<core::LineId>& lines,
-                                   const features::FrameFeatures& frame, const sensor::Pinhole& camera,
-                                   const geometry::Rigid3& camera_from_world, double radius,
-                                   const AssociationOptions& options, std::vector<core::LineId>* visible) {
+                                   const PosedFrame& posed, double radius, const AssociationOptions& options,
+                                   std::vector<core::LineId>* visible) {
+  const features::FrameFeatures& frame = posed.features;
   const auto min_cosine = static_cast<float>(std::cos(options.max_line_angle_rad));
   const std::vector<LineCandidate> candidates = candidates_of(frame);
-
   std::vector<LineMatch> by_feature(frame.lines.size());
+
   for (core::LineId id : lines) {
     const maps::MapLine* line = map.find(id);
     features::LineSegment predicted;
-    if (line == nullptr || !project_segment(*line, camera_from_world, camera, predicted)) continue;
+    if (line == nullptr || !project_segment(*line, posed.camera_from_world, posed.camera, predicted))
+      continue;
 
     if (visible != nullptr) visible->push_back(id);
     LineMatch best{id, -1, options.max_line_hamming + 1};
     const Eigen::Vector2f d = predicted.direction();
     const float length = predicted.length();
 
+    // Similar in place, direction, length and descriptor
     for (std::size_t i = 0; i < candidates.size(); ++i) {
       if (d.dot(candidates[i].direction) < min_cosine) continue;
       const Eigen::Vector2f r = candidates[i].middle - predicted.start;
@@ -74,6 +77,7 @@ std::vector<LineMatch> match_lines(const maps::Map& map, const std::vector<core:
       if (distance < best.distance) best = {id, static_cast<int>(i), distance};
     }
 
+    // Each feature keeps its best landmark
     if (best.feature < 0) continue;
     LineMatch& slot = by_feature[static_cast<std::size_t>(best.feature)];
     if (slot.feature < 0 || best.distance < slot.distance) slot = best;

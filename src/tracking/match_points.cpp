@@ -15,18 +15,26 @@ struct Prediction {
   int octave = 0;
 };
 
-bool predict(const maps::MapPoint& point, const geometry::Rigid3& camera_from_world,
-             const Eigen::Vector3d& centre, const sensor::Pinhole& camera, double log_scale,
-             double octaves_closer, Prediction& prediction) {
-  const Eigen::Vector3d p = camera_from_world * point.position;
+/// A camera at a guess of its pose.
+struct Viewer {
+  const sensor::Pinhole& camera;
+  const geometry::Rigid3& camera_from_world;
+  Eigen::Vector3d centre;  ///< in the world
+  double log_scale;        ///< of one octave
+};
+
+/// False if the landmark is not in the image, or was seen from another side or distance.
+bool predict(const maps::MapPoint& point, const Viewer& viewer, double octaves_closer,
+             Prediction& prediction) {
+  const Eigen::Vector3d p = viewer.camera_from_world * point.position;
   if (p.z() < 0.1) return false;
-  const Eigen::Vector2d pixel = camera.project(p);
-  if (!camera.contains(pixel)) return false;
-  const Eigen::Vector3d ray = point.position - centre;
+  const Eigen::Vector2d pixel = viewer.camera.project(p);
+  if (!viewer.camera.contains(pixel)) return false;
+  const Eigen::Vector3d ray = point.position - viewer.centre;
   const double distance = ray.norm();
   if (ray.dot(point.view_direction) < 0.4 * distance) return false;  // seen from another side
-  const double octave =
-      point.reference_octave + std::log(point.reference_distance / distance) / log_scale + octaves_closer;
+  const double octave = point.reference_octave +
+                        std::log(point.reference_distance / distance) / viewer.log_scale + octaves_closer;
   // Many landmarks of another camera are smaller than anything that this one can see.
   const double beyond = octaves_closer == 0.0 ? 2.5 : 0.5;
   if (octave < -beyond || octave > 7.0 + beyond) return false;
@@ -55,6 +63,7 @@ class Roll {
     if (!keyframe.valid() || !map_.has_keyframe(keyframe)) return 0.0F;
     const auto [found, inserted] = degrees_.try_emplace(keyframe, 0.0F);
     if (inserted) {
+      // Once for each keyframe: rotation about the optical axis
       const Eigen::Matrix3d r = camera_.rotation * map_.camera_from_world(keyframe).rotation.transpose();
       found->second = static_cast<float>(std::atan2(r(1, 0), r(0, 0)) * 180.0 / 3.14159265358979);
     }
@@ -79,6 +88,8 @@ struct BestTwo {
   int distance = 257;
   int second = 257;
 };
+
+// Best and second best corner; several at one place count once.
 BestTwo best_two(const std::vector<features::PointFeature>& corners, const std::vector<int>& near,
                  const std::vector<int>& distances) {
   constexpr float kSamePlace_px = 3.0F;
@@ -116,13 +127,13 @@ void AssociationOptions::declare(core::OptionTable& table) {
 }
 
 std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<core::PointId>& points,
-                                     const features::FrameFeatures& frame, const sensor::Pinhole& camera,
-                                     const geometry::Rigid3& camera_from_world, double radius,
+                                     const PosedFrame& posed, double radius,
                                      const AssociationOptions& options, std::vector<core::PointId>* visible) {
-  const Eigen::Vector3d centre = camera_from_world.inverse().translation;
-  const double log_scale = std::log(options.scale_factor);
-  const std::vector<double> closer = octaves_closer(options.focals_px, camera, log_scale);
-  Roll roll(map, camera_from_world);
+  const features::FrameFeatures& frame = posed.features;
+  const Viewer viewer{posed.camera, posed.camera_from_world, posed.camera_from_world.inverse().translation,
+                      std::log(options.scale_factor)};
+  const std::vector<double> closer = octaves_closer(options.focals_px, viewer.camera, viewer.log_scale);
+  Roll roll(map, viewer.camera_from_world);
   const auto max_turn = static_cast<float>(options.max_point_angle_rad * 180.0 / 3.14159265358979);
   std::vector<PointMatch> by_feature(frame.points.size());
   std::vector<int> near;
@@ -133,16 +144,15 @@ std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<cor
     Prediction prediction;
     const auto robot = static_cast<std::size_t>(id.robot);
     const double octaves = robot < closer.size() ? closer[robot] : 0.0;
-    if (point == nullptr ||
-        !predict(*point, camera_from_world, centre, camera, log_scale, octaves, prediction)) {
-      continue;
-    }
-
+    if (point == nullptr || !predict(*point, viewer, octaves, prediction)) continue;
     if (visible != nullptr) visible->push_back(id);
+
+    // Corners near the prediction, farther on coarse levels
     near.clear();
     const double grown = radius * std::pow(options.scale_factor, std::clamp(prediction.octave, 0, 4));
     frame.grid.within(frame.points, prediction.u, prediction.v, static_cast<float>(grown), near);
 
+    // Only corners of similar size and orientation
     const float angle = point->angle + roll.since(point->angle_keyframe);
     const auto unlike = [&](int i) {
       const features::PointFeature& f = frame.points[static_cast<std::size_t>(i)];
@@ -157,6 +167,7 @@ std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<cor
       distances.push_back(features::hamming_distance(point->descriptor, other));
     }
 
+    // Unambiguous matches; each corner keeps its best landmark
     const BestTwo best = best_two(frame.points, near, distances);
     if (best.distance > options.max_hamming || best.distance > options.ratio * best.second) continue;
     PointMatch& slot = by_feature[static_cast<std::size_t>(best.feature)];

@@ -9,7 +9,7 @@ geometry::Rigid3 MotionModel::predict(double stamp) const {
   if (knows_odometry()) return odometry_->inverse() * *last_odometry_ * camera_from_world_;
   geometry::Rigid3 motion = motion_within(std::clamp(stamp - stamp_, 0.0, 0.2));
   if (knows_wheels()) motion = *sensed_.moved;
-  // The camera's centre moves as before; how it turns the gyroscope knows better.
+  // The camera's centre moves as before; the gyroscope measures the rotation better.
   if (knows_turn())
     motion = {*sensed_.turned, *sensed_.turned * (motion.rotation.transpose() * motion.translation)};
   return motion * camera_from_world_;
@@ -32,17 +32,18 @@ bool MotionModel::reliable(double stamp) const {
 }
 
 void MotionModel::update(double stamp, const TrackResult& result) {
-  // Share of a change of motion that is ignored in directions that hardly anything else holds.
+  // Share of a change of motion that is ignored in directions that hardly anything else constrains.
   constexpr double kDoubt = 0.75;
   const double dt = stamp - stamp_;
   dead_reckoning_s_ = result.dead_reckoned && valid_ ? dead_reckoning_s_ + dt : 0.0;
 
+  // Velocity between consecutive frames
   if (continuous() && dt > 1e-4 && dt < 0.5) {
     const bool known = reliable(stamp);
     const geometry::Vector6d before = velocity_;
     velocity_ = geometry::log_se3(result.camera_from_world * camera_from_world_.inverse()) / dt;
 
-    // In directions that little but the motion model holds, steps are noise above all and would accumulate.
+    // In directions that mainly the motion model constrains, steps are mostly noise, which would accumulate.
     if (known && !result.motion_contradicted)
       velocity_ -= kDoubt * (result.onto_degenerate * (velocity_ - before));
     ++steps_;

@@ -14,7 +14,7 @@ namespace {
 constexpr double kDegenerate = 2500.0;  // information of a standard deviation of 2 cm
 constexpr double kLikely = 4e4;         // of 5 mm
 constexpr double kSurfaceOnly = 1e7;    // of 0.3 mm
-// Squared, in a direction that they hold; they are good to 3 degrees.
+// Smallest squared share of the normals along a constrained direction; normals are exact to 3 degrees.
 constexpr double kShareOfNormals = 0.004;
 const Vector6d kDirectionScale = (Vector6d() << 1.0, 1.0, 1.0, 0.5, 0.5, 0.5).finished();
 
@@ -49,6 +49,8 @@ std::optional<optimize::PosePrior> motion_prior(const geometry::Matrix6d& inform
   const double worth = trust == MotionTrust::kSurfaceOnly ? kSurfaceOnly
                        : trust == MotionTrust::kLikely    ? kLikely
                                                           : kDegenerate;
+
+  // The prior only constrains degenerate directions
   geometry::Matrix6d degenerate = geometry::Matrix6d::Zero();
   for (int i = 0; i < 6 && directions.eigenvalues(i) < limit; ++i) {
     degenerate += worth * directions.eigenvectors.col(i) * directions.eigenvectors.col(i).transpose();

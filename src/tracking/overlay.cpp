@@ -108,6 +108,7 @@ void draw_lines(cv::Mat& image, const features::FrameFeatures& features, const T
     const maps::MapLine* landmark = map.find(match.line);
     if (landmark == nullptr) continue;
 
+    // The landmark at the estimated pose
     const Eigen::Vector3d a = track.camera_from_world * landmark->start;
     const Eigen::Vector3d b = track.camera_from_world * landmark->end;
     draw_projected_segment(image, a, b, camera);
@@ -115,6 +116,7 @@ void draw_lines(cv::Mat& image, const features::FrameFeatures& features, const T
     const Eigen::Vector2d normal = l.head<2>();
     if (!(normal.squaredNorm() > 0.0)) continue;  // through the camera's centre: no image
 
+    // Distances of the measured ends from the projected line
     for (const Pixel& end : ends) {
       const double distance = l.dot(end.homogeneous()) / normal.norm();
       draw_residual(image, end, end - distance * normal.normalized());
@@ -130,6 +132,8 @@ void draw_points(cv::Mat& image, const features::FrameFeatures& features, const 
     const maps::MapPoint* landmark = map.find(match.point);
     disc(image, measured, 2.5, kMeasured, 1);
     if (landmark == nullptr) continue;
+
+    // The landmark at the estimated pose
     const Eigen::Vector3d p = track.camera_from_world * landmark->position;
     if (p.z() <= kNear_m) continue;
     const Pixel predicted = camera.project(p);
@@ -138,7 +142,7 @@ void draw_points(cv::Mat& image, const features::FrameFeatures& features, const 
   }
 }
 
-/// Words with a measure of their own size: 1 at 640 px width.
+/// Writes text of a size relative to the image: 1 at 640 px width.
 class Writer {
  public:
   explicit Writer(cv::Mat& image) : image_(image), scale_(std::max(0.25, image.cols / 640.0)) {}
@@ -180,6 +184,8 @@ void write_state(Writer& out, const sensor::RgbdFrame& frame, const TrackResult&
   const cv::Scalar weak_color = track.degenerate_directions > 0 ? kLostText : kText;
   out.text(x + out.px(14), out.px(14),
            "weak directions " + std::to_string(track.degenerate_directions) + " of 6", weak_color);
+
+  // Inliers and residuals of each family
   x = out.px(6);
   for (const std::string& words :
        {family("points", track.estimate.points), family("lines", track.estimate.lines),
@@ -195,6 +201,8 @@ void write_legend(Writer& out) {
 
   const int baseline = image.rows - out.px(6);
   const double middle = baseline - out.px(4);
+
+  // A stroke, then its meaning
   const auto sample = [&](int& x, const char* words, const cv::Scalar& color, int width) {
     stroke(image, {x, middle}, {x + out.px(14), middle}, color, width);
     x = out.text(x + out.px(18), baseline, words, kText) + out.px(12);
@@ -209,6 +217,7 @@ void write_legend(Writer& out) {
   std::snprintf(zoom, sizeof zoom, "residual x%.0f: 0", kResidualZoom);
   x = out.text(x, baseline, zoom, kText) + out.px(5);
 
+  // Colours of the residuals
   const int length = out.px(60);
   for (int i = 0; i < length; ++i) {
     stroke(image, {x + i, middle - out.px(3)}, {x + i, middle + out.px(3)},
@@ -229,6 +238,8 @@ cv::Mat draw_overlay(const sensor::RgbdFrame& frame, const features::FrameFeatur
   Writer out(image);
   write_state(out, frame, track);
   write_legend(out);
+
+  // Lost: a frame around the image
   if (track.state == TrackState::kLost) {
     cv::rectangle(image, {0, 0, image.cols, image.rows}, kLostText, std::max(2, out.px(3)));
   }

@@ -33,6 +33,7 @@ std::vector<Pair> match_all(const maps::Map& map, core::KeyframeId keyframe,
     features::hamming_distances(map.point(id).descriptor, frame.descriptors.data(), distances.size(),
                                 distances.data());
 
+    // Best match, and second best at another place
     const auto best = std::min_element(distances.begin(), distances.end());
     const auto feature = static_cast<std::size_t>(best - distances.begin());
     int second = 257;
@@ -41,6 +42,7 @@ std::vector<Pair> match_all(const maps::Map& map, core::KeyframeId keyframe,
       if (elsewhere) second = std::min(second, distances[i]);
     }
 
+    // Unambiguous, and the best landmark of its feature
     if (*best > kMaxHamming || *best > kRatio * second) continue;
     if (*best < by_feature[feature].distance) by_feature[feature] = {*best, id};
   }
@@ -104,6 +106,7 @@ std::optional<Relocalisation> relocalise(const maps::Map& map,
     const int count = static_cast<int>(inliers.size());
     if (!solved || count < min_inliers || (best && best->inliers >= count)) continue;
 
+    // Refined with all inliers
     const Eigen::Vector3d r(rotation[0], rotation[1], rotation[2]);
     const geometry::Rigid3 start(geometry::exp_so3(r),
                                  Eigen::Vector3d(translation[0], translation[1], translation[2]));

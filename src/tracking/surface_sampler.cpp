@@ -66,12 +66,14 @@ HalfDepth half_depth(const cv::Mat& depth) {
         high = std::max(high, v);
       }
 
+      // No mean across a depth border
       if (count >= 2 && high - low < same_surface(low)) {
         raw.z[static_cast<std::size_t>(y * raw.width + x)] = sum / static_cast<float>(count);
       }
     }
   }
 
+  // Smoothed among neighbours on the same surface
   HalfDepth smooth = raw;
   const auto read = [&raw](int x, int y) { return raw.at(x, y); };
   for (int y = 0; y < raw.height; ++y) {
@@ -113,6 +115,7 @@ constexpr int kCellsY = 12;
 constexpr int kAzimuths = 8;
 constexpr int kElevations = 4;
 
+// Bin of a normal; near the optical axis all azimuths are one.
 int direction_bin(const Eigen::Vector3f& n) {
   constexpr float kPi = 3.14159265F;
   const float azimuth = (std::atan2(n.y(), n.x()) + kPi) / (2.0F * kPi);
@@ -141,6 +144,7 @@ std::vector<SurfaceCandidate> candidates(const HalfDepth& depth, const sensor::P
       const int by = straight_base(depth, x, y, 0, 1);
       if (bx == 0 || by == 0) continue;
 
+      // Normal from differences over a wide base
       SurfaceCandidate c;
       c.sample.point = point(x, y);
       const Eigen::Vector3f du = point(x + bx, y) - point(x - bx, y);
@@ -210,6 +214,7 @@ std::vector<maps::SurfaceSample> sample_surface(const cv::Mat& depth, const sens
   std::sort(order.begin(), order.end(),
             [&](std::uint32_t a, std::uint32_t b) { return scramble(a) < scramble(b); });
 
+  // Half by cells of the image, half by normals
   std::vector<char> taken(all.size(), 0);
   take_evenly(
       all, order, [](const SurfaceCandidate& c) { return c.cell; }, kCellsX * kCellsY, options.samples / 2,

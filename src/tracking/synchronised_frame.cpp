@@ -22,6 +22,7 @@ double Tracker::depth_delay_s(const sensor::RgbdFrame& frame) const {
 std::shared_ptr<const features::FrameFeatures> synchronised(
     const std::shared_ptr<const features::FrameFeatures>& features, const cv::Mat& depth,
     const sensor::Pinhole& camera, const ImageMotion& motion) {
+  // Without motion the features need no change
   if (!motion.moves_depth() && motion.shutter.isZero(0.0)) return features;
   auto result = std::make_shared<features::FrameFeatures>(*features);
   if (motion.moves_depth())

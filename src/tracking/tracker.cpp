@@ -58,7 +58,7 @@ void TrackerOptions::declare(core::OptionTable& table) {
 Tracker::Tracker(const TrackerOptions& options, const sensor::Pinhole& camera)
     : options_(options), camera_(camera) {}
 
-/// Gives the motion model what is known of this frame besides its pictures.
+/// Passes odometry and inertial measurements of the frame to the motion model.
 void Tracker::sense(const sensor::RgbdFrame& frame) {
   motion_.set_odometry(frame.odometry);
   if (sensor_) motion_.set_sensed(sensor_(motion_.last_stamp(), frame.stamp));
@@ -69,6 +69,8 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
   if (map.keyframe_count() == 0) return initialise(frame, features);
 
   const TrackedImage image = image_of(frame, features);
+
+  // After a long loss, relocalisation comes first
   const bool outdated = motion_.outdated();
   std::optional<TrackResult> result = outdated ? relocalise(map, image) : track_with_motion_model(map, image);
   if (!result) result = outdated ? track_with_motion_model(map, image) : relocalise(map, image);
@@ -116,6 +118,8 @@ void Tracker::record(const sensor::RgbdFrame& frame, TrackResult& result) {
   result.reference = reference();
   result.continuous = motion_.reliable(frame.stamp);
   result.photometric = result.features->photometric;
+
+  // Aligned points are moved; the pyramid is not needed any more
   result.features = without_pyramid(*result.features, result.points, camera_);
   motion_.update(frame.stamp, result);
   result.turn_rate = global_shutter_ ? 0.0 : motion_.turn_rate();
@@ -130,6 +134,8 @@ TrackResult Tracker::begin_at(const geometry::Rigid3& camera_from_world, const s
   result.camera_from_world = camera_from_world;
   result.relocalised = true;
   result.features = features;
+
+  // Motion does not continue from the frame before
   motion_.reset();
   record(frame, result);
   result.reference = {};
@@ -146,6 +152,8 @@ void Tracker::restore(const maps::Map& map, core::KeyframeId reference, const ge
   const maps::Keyframe& keyframe = map.keyframe(reference);
   map_changed(map, reference, map.camera_from_world(reference));
   if (keyframe.features == nullptr) return;
+
+  // The next frame is aligned with this keyframe
   motion_.restore(keyframe.stamp, velocity);
   thumbnail_ = keyframe.features->thumbnail;
   thumbnail_depth_ = keyframe.features->thumbnail_depth;

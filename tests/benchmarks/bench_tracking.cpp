@@ -115,8 +115,8 @@ void associate_surface(benchmark::State& state) {
   options.max_samples = static_cast<int>(state.range(0));
   std::size_t found = 0;
   for (auto _ : state) {
-    found = tracking::associate_surface(room.local_map.surface, room.frame.depth, room.camera,
-                                        room.camera_from_world, {}, options)
+    found = tracking::associate_surface(room.local_map.surface,
+                                        {room.frame.depth, room.camera, room.camera_from_world, {}}, options)
                 .size();
   }
   state.counters["terms"] = static_cast<double>(found);
@@ -128,8 +128,9 @@ void match_points(benchmark::State& state) {
   std::size_t found = 0;
   for (auto _ : state) {
     std::vector<core::PointId> visible;
-    found = tracking::match_points(room.slam->map(), room.local_map.points, room.frame_features, room.camera,
-                                   room.camera_from_world, static_cast<double>(state.range(0)), {}, &visible)
+    found = tracking::match_points(room.slam->map(), room.local_map.points,
+                                   {room.frame_features, room.camera, room.camera_from_world},
+                                   static_cast<double>(state.range(0)), {}, &visible)
                 .size();
   }
   state.counters["landmarks"] = static_cast<double>(room.local_map.points.size());
@@ -142,8 +143,9 @@ void match_lines(benchmark::State& state) {
   std::size_t found = 0;
   for (auto _ : state) {
     std::vector<core::LineId> visible;
-    found = tracking::match_lines(room.slam->map(), room.local_map.lines, room.frame_features, room.camera,
-                                  room.camera_from_world, static_cast<double>(state.range(0)), {}, &visible)
+    found = tracking::match_lines(room.slam->map(), room.local_map.lines,
+                                  {room.frame_features, room.camera, room.camera_from_world},
+                                  static_cast<double>(state.range(0)), {}, &visible)
                 .size();
   }
   state.counters["landmarks"] = static_cast<double>(room.local_map.lines.size());
@@ -156,23 +158,23 @@ optimize::PoseProblem pose_problem(const Room& room) {
   const maps::Map& map = room.slam->map();
   optimize::PoseProblem problem;
   problem.camera = room.camera;
-  for (const tracking::PointMatch& m :
-       tracking::match_points(map, room.local_map.points, room.frame_features, room.camera,
-                              room.camera_from_world, 12.0, {}, nullptr)) {
+  for (const tracking::PointMatch& m : tracking::match_points(
+           map, room.local_map.points, {room.frame_features, room.camera, room.camera_from_world}, 12.0, {},
+           nullptr)) {
     const features::PointFeature& f = room.frame_features.points[static_cast<std::size_t>(m.feature)];
     problem.points.push_back(
         {map.point(m.point).position, f.pixel.cast<double>(), 1.0, static_cast<double>(f.depth), 0.01});
   }
   for (const tracking::LineMatch& m :
-       tracking::match_lines(map, room.local_map.lines, room.frame_features, room.camera,
-                             room.camera_from_world, 12.0, {}, nullptr)) {
+       tracking::match_lines(map, room.local_map.lines,
+                             {room.frame_features, room.camera, room.camera_from_world}, 12.0, {}, nullptr)) {
     const features::LineSegment& s = room.frame_features.lines[static_cast<std::size_t>(m.feature)].segment;
     const maps::MapLine& line = map.line(m.line);
     problem.lines.push_back(
         {geometry::line_through(line.start, line.end), s.start.cast<double>(), s.end.cast<double>(), 1.2});
   }
-  problem.planes = tracking::associate_surface(room.local_map.surface, room.frame.depth, room.camera,
-                                               room.camera_from_world, {}, {});
+  problem.planes = tracking::associate_surface(
+      room.local_map.surface, {room.frame.depth, room.camera, room.camera_from_world, {}}, {});
   return problem;
 }
 

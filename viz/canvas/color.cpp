@@ -31,6 +31,7 @@ Rgb sequential_color(double s) {
                                               {170, 220, 50},
                                               {253, 231, 37}}};
 
+  // Interpolated between the nearest stops.
   if (!std::isfinite(s)) return {150, 150, 150};
   const double at = std::clamp(s, 0.0, 1.0) * static_cast<double>(kStops.size() - 1);
   const auto i = std::min(static_cast<std::size_t>(at), kStops.size() - 2);

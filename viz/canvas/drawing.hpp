@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Functions that need VTK, OSMesa or Graphviz: a part of its own (core/part.hpp). They are those of the
+// Functions that need VTK, OSMesa or Graphviz: a separate part (core/part.hpp). They are those of the
 // public headers.
 #include "plumbline/core/part.hpp"
 #include "plumbline/viz/graph_picture.hpp"

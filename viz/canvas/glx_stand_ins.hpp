@@ -31,6 +31,8 @@ __attribute__((visibility("default"))) plumbline::viz::Drawing::GlFunction glXGe
   if (std::strcmp(text, "glXGetCurrentDisplay") == 0) {
     return reinterpret_cast<plumbline::viz::Drawing::GlFunction>(&glXGetCurrentDisplay);
   }
+
+  // Nothing else of GLX exists here.
   return std::strncmp(text, "glX", 3) == 0 ? nullptr : plumbline::viz::offscreen_function(text);
 }
 

@@ -45,6 +45,7 @@ core::Result<std::unique_ptr<OffscreenWindow>> OffscreenWindow::open(int width_p
                             2,
                             0};
 
+  // OSMesa draws into memory, without a display.
   std::unique_ptr<OffscreenWindow> result(new OffscreenWindow);
   result->context_ = std::make_unique<Context>();
   Context& context = *result->context_;
@@ -60,10 +61,14 @@ core::Result<std::unique_ptr<OffscreenWindow>> OffscreenWindow::open(int width_p
 
   result->window_ = vtkSmartPointer<vtkGenericOpenGLRenderWindow>::New();
   vtkGenericOpenGLRenderWindow* window = result->window_;
+
+  // VTK asks if the context is current.
   vtkNew<vtkCallbackCommand> is_current;
   is_current->SetCallback(
       [](vtkObject*, unsigned long, void*, void* answer) { *static_cast<bool*>(answer) = true; });
   window->AddObserver(vtkCommand::WindowIsCurrentEvent, is_current);
+
+  // The context belongs to OSMesa, not to VTK.
   window->SetReadyForRendering(true);
   window->SetOwnContext(0);
   window->SetIsDirect(1);

@@ -15,6 +15,7 @@ namespace {
 
 unsigned char alpha(double opacity) { return static_cast<unsigned char>(std::lround(255.0 * opacity)); }
 
+/// All properties are set, for VTK keeps them from call to call.
 void set_text(vtkContext2D* context, double size_px, const Rgb& color, bool bold) {
   vtkTextProperty* property = context->GetTextProp();
   property->SetFontFamilyToArial();
@@ -33,6 +34,8 @@ void set_text(vtkContext2D* context, double size_px, const Rgb& color, bool bold
 void Painter::polyline(const std::vector<Eigen::Vector2d>& points, const Rgb& color, double width_px,
                        double opacity) {
   if (points.size() < 2) return;
+
+  // VTK takes flat coordinates.
   std::vector<float> xy;
   xy.reserve(2 * points.size());
   for (const auto& p : points) {

@@ -64,9 +64,12 @@ Bytes filter(const cv::Mat3b& picture) {
   std::array<Bytes, 5> filtered;
   filtered.fill(Bytes(size));
 
+  // PNG begins at the top, the image at the bottom.
   for (int y = picture.rows - 1; y >= 0; --y) {
     std::copy_n(picture.ptr(y), size, row.begin() + kPixel);
     filter_row(row.data() + kPixel, above.data() + kPixel, size, filtered);
+
+    // Smallest sum of absolute differences.
     std::size_t best = 0;
     std::array<int, 5> sums{};
     for (std::size_t f = 0; f < filtered.size(); ++f) {
@@ -74,6 +77,7 @@ Bytes filter(const cv::Mat3b& picture) {
       if (sums[f] < sums[best]) best = f;
     }
 
+    // Each row begins with its filter's number.
     result.push_back(static_cast<std::uint8_t>(best));
     result.insert(result.end(), filtered[best].begin(), filtered[best].end());
     std::swap(row, above);
@@ -82,6 +86,7 @@ Bytes filter(const cv::Mat3b& picture) {
   return result;
 }
 
+/// A zlib stream, as PNG's data chunk holds it.
 std::string compress(const Bytes& bytes) {
   const std::unique_ptr<libdeflate_compressor, decltype(&libdeflate_free_compressor)> compressor(
       core::made(libdeflate_alloc_compressor(kLevel)), &libdeflate_free_compressor);
@@ -96,6 +101,8 @@ std::string compress(const Bytes& bytes) {
 core::Result<void> write_png(const cv::Mat3b& picture, const std::filesystem::path& file) {
   const std::string eight_bit_rgb("\x08\x02\0\0\0", 5);
   std::string png = "\x89PNG\r\n\x1A\n";
+
+  // The smallest valid file: header, pixels, end.
   append_chunk("IHDR",
                big_endian(static_cast<std::uint32_t>(picture.cols)) +
                    big_endian(static_cast<std::uint32_t>(picture.rows)) + eight_bit_rgb,

@@ -31,6 +31,7 @@ struct Context {
 }  // namespace
 
 core::Result<void> draw_graph(const std::string& dot, const std::filesystem::path& file) {
+  // Graphviz chooses its renderer by the ending.
   const std::string ending = file.extension().string();
   if (ending != ".png" && ending != ".svg" && ending != ".pdf") {
     return core::usage_error(fmt::format("{}: graphs are drawn as .png, .svg or .pdf", file.string()));
@@ -41,6 +42,7 @@ core::Result<void> draw_graph(const std::string& dot, const std::filesystem::pat
   context.graph = agmemread(dot.c_str());
   if (context.graph == nullptr) return core::usage_error("the graph is not in the DOT language");
 
+  // Positions of nodes, then the drawing.
   context.laid_out = gvLayout(context.gvc, context.graph, "dot") == 0;
   char* bytes = nullptr;
   unsigned int length = 0;
@@ -51,6 +53,7 @@ core::Result<void> draw_graph(const std::string& dot, const std::filesystem::pat
     return core::failure(core::ErrorKind::kInternal, "Graphviz could not draw the graph");
   }
 
+  // Memory of Graphviz is freed by Graphviz.
   const std::unique_ptr<char, void (*)(char*)> owner(bytes, gvFreeRenderData);
   return core::write_file(file, {bytes, length});
 }

@@ -24,6 +24,8 @@ std::string markup_text(std::string_view text) {
   out.reserve(text.size());
   while (!text.empty()) {
     const std::size_t length = character_at(text);
+
+    // Markup is escaped, invalid UTF-8 replaced.
     const std::size_t markup = kMarkup.find(text.front());
     if (markup != std::string_view::npos) {
       out += kEntities[markup];

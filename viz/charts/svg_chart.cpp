@@ -60,11 +60,13 @@ void find_ranges(const SvgChart& chart, Plot& plot) {
     y.include(line.y);
   }
 
+  // Dots count as well as lines.
   for (const SvgDots& dots : chart.dots) {
     x.include(dots.x);
     y.include(dots.y);
   }
 
+  // A background in metres is shown in full.
   if (chart.equal_aspect && chart.background) {
     x.include({chart.background->x.first, chart.background->x.second});
     y.include({chart.background->y.first, chart.background->y.second});
@@ -116,6 +118,7 @@ class Pen {
     double x, y;
   };
   void end_column() {
+    // Ends and extremes draw a crowded pixel column.
     if (column_.size() <= 4) {
       for (const Place& p : column_) draw(p);
     } else {
@@ -126,6 +129,8 @@ class Pen {
     }
     column_.clear();
   }
+
+  /// Places that repeat add nothing to the path.
   void draw(const Place& p) {
     std::string place = fmt::format("{:.1f},{:.1f}", p.x, p.y);
     if (down_ && place == last_) return;
@@ -144,7 +149,9 @@ class Pen {
   std::string path_;
 };
 
+/// Grid, tick labels and axis labels.
 std::string axes(const SvgChart& chart, const Plot& plot) {
+  // Ticks about 90 and 42 pixels apart.
   const double x_wish = (plot.x.second - plot.x.first) * 90.0 / plot.width;
   const double y_wish = chart.equal_aspect ? x_wish : (plot.y.second - plot.y.first) * 42.0 / plot.height;
   std::string grid, words;
@@ -152,12 +159,14 @@ std::string axes(const SvgChart& chart, const Plot& plot) {
     words += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\">{}</text>", x, y, anchor, text);
   };
 
+  // Vertical grid lines.
   for (const Tick& tick : nice_ticks(plot.x.first, plot.x.second, x_wish)) {
     const double x = kLeft + plot.px(tick.value);
     grid += fmt::format("M{:.1f},{:.1f}v{:.1f}", x, kTop, plot.height);
     say(x, kTop + plot.height + 16.0, "middle", tick.label);
   }
 
+  // Horizontal grid lines, unless suppressed.
   for (const Tick& tick :
        chart.y_ticks ? nice_ticks(plot.y.first, plot.y.second, y_wish) : std::vector<Tick>{}) {
     const double y = kTop + plot.py(tick.value);
@@ -165,6 +174,7 @@ std::string axes(const SvgChart& chart, const Plot& plot) {
     say(kLeft - 6.0, y + 4.0, "end", tick.label);
   }
 
+  // The label of y reads upwards.
   if (!chart.y_label.empty()) {
     words +=
         fmt::format("<text transform=\"translate(13,{:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
@@ -178,6 +188,7 @@ std::string axes(const SvgChart& chart, const Plot& plot) {
   return (grid.empty() ? "" : "<path class=\"grid\" d=\"" + grid + "\"/>") + words;
 }
 
+/// Everything within the axes, from back to front.
 std::string marks(const SvgChart& chart, const Plot& plot) {
   std::string out;
   if (chart.background) {
@@ -189,12 +200,14 @@ std::string marks(const SvgChart& chart, const Plot& plot) {
         plot.py(b.y.first) - plot.py(b.y.second), b.data_uri);
   }
 
+  // Periods of time behind the lines.
   for (const SvgBand& band : chart.bands) {
     out += fmt::format("<rect class=\"band-{}\" x=\"{:.1f}\" y=\"0\" width=\"{:.1f}\" height=\"{:.1f}\"/>",
                        band.kind, plot.px(band.from), std::max(1.0, plot.px(band.to) - plot.px(band.from)),
                        plot.height);
   }
 
+  // The pen is lifted at gaps.
   for (const SvgLine& line : chart.lines) {
     Pen pen;
     for (std::size_t i = 0; i < std::min(line.x.size(), line.y.size()); ++i) {
@@ -203,6 +216,7 @@ std::string marks(const SvgChart& chart, const Plot& plot) {
     out += fmt::format("<path class=\"line {}\" d=\"{}\"/>", line.kind, pen.path());
   }
 
+  // Dots at unknown places are left out.
   for (const SvgDots& dots : chart.dots) {
     for (std::size_t i = 0; i < std::min(dots.x.size(), dots.y.size()); ++i) {
       if (!std::isfinite(dots.x[i]) || !std::isfinite(dots.y[i])) continue;
@@ -231,6 +245,7 @@ std::vector<std::pair<std::string, std::string>> legend_entries(const SvgChart& 
   return entries;
 }
 
+/// Legend as an HTML list; empty without entries.
 std::string legend(const SvgChart& chart) {
   std::string entries;
   for (const auto& [sample, label] : legend_entries(chart)) {
@@ -246,6 +261,7 @@ struct SvgDrawing {
   double height = 0.0;
 };
 
+/// The chart with its axes, and its height.
 SvgDrawing draw(const SvgChart& chart) {
   Plot plot;
   const double below = kBelow + (chart.x_label.empty() ? 0.0 : kLabelBelow);
@@ -316,23 +332,28 @@ std::string svg_document(const std::vector<SvgChart>& charts, std::size_t column
   double width = 0.0, x = 0.0, y = 0.0, row = 0.0;
 
   for (std::size_t i = 0; i < charts.size(); ++i) {
+    // A new row of charts.
     if (i % columns == 0) {
       x = 0.0;
       y += row;
       row = 0.0;
     }
 
+    // Title above legend above drawing.
     const SvgDrawing words = legend_words(charts[i]);
     const SvgDrawing drawing = draw(charts[i]);
     body += fmt::format(
         "<g transform=\"translate({:.0f},{:.0f})\"><text class=\"title\" x=\"{:.0f}\" y=\"18\">{}</text>"
         "<g transform=\"translate(0,{:.0f})\">{}</g><g transform=\"translate(0,{:.0f})\">{}</g></g>\n",
         x, y, kLeft, markup_text(charts[i].title), kTitle, words.svg, kTitle + words.height, drawing.svg);
+
+    // The next chart is to its right.
     x += charts[i].width_px;
     width = std::max(width, x);
     row = std::max(row, kTitle + words.height + drawing.height);
   }
 
+  // Files without a page carry their style.
   return fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.0f}\" height=\"{1:.0f}\" viewBox=\"0 0 {0:.0f} "
       "{1:.0f}\"><style>{2}</style><rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n{3}</svg>\n",
@@ -340,6 +361,7 @@ std::string svg_document(const std::vector<SvgChart>& charts, std::size_t column
 }
 
 std::string svg_chart_style() {
+  // Colours are variables of the page.
   std::string css =
       ".chart{margin:.6em 0}.chart>svg{display:block;width:100%;height:auto}"
       ".chart text{font-size:12px;fill:var(--muted)}.chart .frame{fill:none;stroke:var(--rule)}"
@@ -354,6 +376,7 @@ std::string svg_chart_style() {
       ".truth{--k:#868c94;stroke-dasharray:5 4}.lost{--k:#d92d20;stroke-dasharray:3 4}"
       ".loop{--k:#aa4499;stroke-width:1}.plain{--k:#6b7280}\n";
 
+  // Categories, lighter on a dark ground.
   std::string dark;
   for (std::size_t i = 0; i < 8; ++i) {
     const Rgb c = category_color(i);

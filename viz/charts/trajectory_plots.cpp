@@ -34,6 +34,7 @@ std::vector<double> coordinate(const Trajectory& trajectory, int axis) {
   return values;
 }
 
+/// Given errors, else distances between estimate and truth.
 std::vector<double> errors_of(const TrajectoryComparison& comparison) {
   if (!comparison.error_m.empty()) return comparison.error_m;
   std::vector<double> errors;
@@ -105,7 +106,7 @@ std::array<std::vector<double>, 3> angles_of(const Trajectory& trajectory) {
   return angles;
 }
 
-/// Moves a whole curve by full turns so that it starts beside a value of another.
+/// Moves a whole curve by full turns so that it starts near a value of another.
 void start_beside(std::vector<double>& degrees, double other) {
   if (degrees.empty()) return;
   const double turns = 360.0 * std::round((other - degrees.front()) / 360.0);
@@ -181,6 +182,7 @@ LengthUnit unit_for(const std::vector<TrajectoryComparison>& comparisons) {
 
 std::string estimate_kind(std::size_t index) { return fmt::format("k{}", index % 8); }
 
+/// All lists of a comparison must have one length.
 core::Result<void> check(const TrajectoryComparison& comparison) {
   const bool truth_fits = comparison.truth.empty() || comparison.truth.size() == comparison.estimate.size();
   const bool errors_fit =
@@ -206,6 +208,7 @@ void add_colored_path(const TrajectoryComparison& comparison, const std::vector<
     return std::min(kErrorClasses - 1, static_cast<std::size_t>(place));
   };
 
+  // One line per class, so that the legend explains it.
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   for (std::size_t k = 0; k < kErrorClasses; ++k) {
     const double most = static_cast<double>(k + 1) * step;
@@ -238,10 +241,12 @@ SvgChart path_chart(const TrajectoryComparison& comparison, const LengthUnit& un
   chart.x_label = fmt::format("{} (m)", kAxisNames[static_cast<std::size_t>(first)]);
   chart.y_label = fmt::format("{} (m)", kAxisNames[static_cast<std::size_t>(second)]);
 
+  // Truth is drawn below the estimate.
   if (!truth.empty()) {
     chart.lines.push_back({"truth", "truth", coordinate(truth, first), coordinate(truth, second)});
   }
 
+  // Coloured by error if it is known.
   const std::vector<double> x = coordinate(comparison.estimate, first);
   const std::vector<double> y = coordinate(comparison.estimate, second);
   if (!x.empty() && errors_of(comparison).size() == x.size()) {
@@ -251,6 +256,7 @@ SvgChart path_chart(const TrajectoryComparison& comparison, const LengthUnit& un
     chart.lines.push_back({"estimate", "k0", with_breaks(x, gaps), with_breaks(y, gaps)});
   }
 
+  // The start shows the direction of travel.
   if (!x.empty()) chart.dots.push_back({"start", "plain", {x.front()}, {y.front()}, 4.0, false});
   return chart;
 }
@@ -264,6 +270,7 @@ std::vector<SvgChart> path_charts(const std::vector<TrajectoryComparison>& compa
   return charts;
 }
 
+/// Error over time; a single trajectory also shows RMS and median.
 SvgChart error_chart(const std::vector<TrajectoryComparison>& comparisons) {
   const LengthUnit unit = unit_for(comparisons);
   const double start = start_of(comparisons);
@@ -274,18 +281,21 @@ SvgChart error_chart(const std::vector<TrajectoryComparison>& comparisons) {
   chart.x_label = "time (s)";
   chart.y_label = fmt::format("position error ({})", unit.name);
 
+  // Gaps in tracking break the line.
   for (std::size_t i = 0; i < comparisons.size(); ++i) {
     const std::vector<double> errors = in_unit(errors_of(comparisons[i]), unit);
     const std::vector<bool> gaps = gaps_in(comparisons[i].estimate);
     std::vector<double> t = seconds(comparisons[i].estimate, start);
     t.resize(errors.size());
 
+    // Unknown errors do not count.
     const std::vector<double> known = finite(errors);
     const std::string label =
         single ? "error" : fmt::format("{}: RMS {:.1f} {}", comparisons[i].name, rms(known), unit.name);
     chart.lines.push_back({label, estimate_kind(i), with_breaks(t, gaps), with_breaks(errors, gaps)});
     if (!single || known.empty()) continue;
 
+    // Levels of a single trajectory.
     const auto level = [&](const char* name, double value, const char* kind) {
       const std::string text = fmt::format("{} {:.1f} {}", name, value, unit.name);
       chart.lines.push_back({text, kind, {t.front(), t.back()}, {value, value}});
@@ -304,6 +314,7 @@ std::vector<SvgChart> pose_charts(const std::vector<TrajectoryComparison>& compa
   const Trajectory truth = shared_truth(comparisons);
   const auto truth_angles = angles_of(truth);
 
+  // Positions on the left, angles on the right.
   for (std::size_t k = 0; k < 3; ++k) {
     charts[2 * k].y_label = fmt::format("{} (m)", kAxisNames[k]);
     charts[2 * k + 1].y_label = fmt::format("{} (deg)", kAngleNames[k]);
@@ -316,6 +327,7 @@ std::vector<SvgChart> pose_charts(const std::vector<TrajectoryComparison>& compa
     chart.height_px = 300;
   }
 
+  // Estimates, with gaps.
   for (std::size_t i = 0; i < comparisons.size(); ++i) {
     const TrajectoryComparison& c = comparisons[i];
     const std::vector<bool> gaps = gaps_in(c.estimate);
@@ -332,6 +344,7 @@ std::vector<SvgChart> pose_charts(const std::vector<TrajectoryComparison>& compa
         start_beside(angles[k], truth_angles[k][index]);
       }
 
+      // Only the first chart names its curves.
       const std::string name = comparisons.size() == 1 ? "estimate" : c.name;
       charts[2 * k].lines.push_back({k == 0 ? name : "", estimate_kind(i), t,
                                      with_breaks(coordinate(c.estimate, static_cast<int>(k)), gaps)});
@@ -339,6 +352,7 @@ std::vector<SvgChart> pose_charts(const std::vector<TrajectoryComparison>& compa
     }
   }
 
+  // Truth on top of all estimates.
   const std::vector<double> t_truth = seconds(truth, start);
   for (std::size_t k = 0; k < 3 && !truth.empty(); ++k) {
     charts[2 * k].lines.push_back(
@@ -349,6 +363,7 @@ std::vector<SvgChart> pose_charts(const std::vector<TrajectoryComparison>& compa
   return charts;
 }
 
+/// Cumulative distribution of each trajectory's errors.
 SvgChart error_distribution_chart(const std::vector<TrajectoryComparison>& comparisons) {
   const LengthUnit unit = unit_for(comparisons);
   SvgChart chart;
@@ -371,12 +386,16 @@ SvgChart error_distribution_chart(const std::vector<TrajectoryComparison>& compa
 core::Result<void> write_trajectory_plots(const std::vector<TrajectoryComparison>& comparisons,
                                           const std::filesystem::path& folder) {
   bool with_errors = false;
+
+  // All inputs are checked before anything is written.
   for (const auto& comparison : comparisons) {
     if (auto checked = check(comparison); !checked) return checked;
     with_errors = with_errors || !errors_of(comparison).empty();
   }
   if (comparisons.empty()) return core::usage_error("trajectory plots: no estimate to draw");
   if (auto made = core::make_folder(folder); !made) return made;
+
+  // Paths need no truth.
   if (auto done = core::write_file(folder / "path.svg", svg_document(path_charts(comparisons), 2)); !done)
     return done;
   if (auto done = core::write_file(folder / "poses.svg", svg_document(pose_charts(comparisons), 2)); !done)

@@ -37,6 +37,8 @@ core::Result<void> check_output(const fs::path& file, bool replace) {
     return core::usage_error(
         fmt::format("{}: is a folder; name a file, such as report.html in it", file.string()));
   }
+
+  // A new file is always permitted.
   if (!fs::is_regular_file(file, ec)) return {};
   if (!is_report(file)) {
     return core::usage_error(fmt::format(
@@ -53,6 +55,7 @@ core::Result<ReportSummary> write_report(const ReportRequest& request, const cor
                                          core::Log& log) {
   const fs::path file = request.output.empty() ? request.result / "report.html" : request.output;
 
+  // Input and output are checked first.
   auto data = read_report_data(request.result);
   if (!data) return tl::unexpected<core::Error>(data.error());
   if (auto free = check_output(file, request.replace); !free)
@@ -60,11 +63,13 @@ core::Result<ReportSummary> write_report(const ReportRequest& request, const cor
 
   if (!data->kind.empty()) log.info(fmt::format("{}: its {}", request.result.string(), data->kind));
 
+  // Truth adds accuracy.
   if (!request.truth.empty()) {
     if (auto added = add_truth(request.truth, *data); !added)
       return tl::unexpected<core::Error>(added.error());
   }
 
+  // Drawn through a hidden file in the same folder.
   fs::path scratch = file;
   scratch.replace_filename(fmt::format(".{}.{}.png", file.filename().string(), getpid()));
   auto pictures = pictures_html(*data, scratch);  // first, because the head reports damaged ones
@@ -76,6 +81,7 @@ core::Result<ReportSummary> write_report(const ReportRequest& request, const cor
   const auto head = head_html(*data, request);
   if (!head) return tl::unexpected<core::Error>(head.error());
 
+  // Sections without text are left out.
   const std::string page = page_html(
       "Plumbline report: " + (request.title.empty() ? data->name : request.title), *head,
       {{"map", "The map to walk through", std::move(*viewer)},

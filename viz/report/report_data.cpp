@@ -25,6 +25,8 @@ using Json = nlohmann::ordered_json;
 
 core::Result<Json> read_summary(const fs::path& file) {
   auto json = core::read_json(file);
+
+  // Missing or forbidden is not damaged.
   if (const std::string fault = fault_of(file); !json && fault != "is damaged")
     return core::input_error(fmt::format("{}: {}", file.string(), fault));
   if (!json) {
@@ -54,6 +56,8 @@ geometry::Trajectory poses_of(const fs::path& file, ReportData& data) {
 void add_paths(ReportData& data) {
   for (const fs::path& folder : maps::ResultFolder{data.folder}.robot_folders()) {
     ReportPath path;
+
+    // The only robot's files are in the folder itself.
     if (folder != data.folder) path.robot = folder.filename().string();
     path.number = data.paths.size();
     path.poses = poses_of(folder / "trajectory.txt", data);
@@ -79,18 +83,21 @@ void add_store(ReportData& data) {
   const fs::path file = data.folder / "map.db";
   std::error_code ec;
   if (!fs::exists(file, ec)) {
+    // Without loops nothing is missing.
     const bool loops =
         number_at(data.summary, "/loops/accepted") > 0.0 || !list_at(data.summary, "/merges").empty();
     if (loops) data.missing.emplace_back("map.db is not there: loops are not drawn");
     return;
   }
 
+  // A damaged map costs only its sections.
   const auto stored = maps::StoredRun::open_main(file);
   if (!stored) {
     data.missing.push_back(fmt::format("map.db {}: loops are not drawn", fault_of(file)));
     return;
   }
 
+  // Cameras, names and numbers of the robots.
   std::map<std::int32_t, sensor::Pinhole> cameras;
   const std::vector<maps::RobotInfo>& robots = stored->stored().header.robots;
   for (const maps::RobotInfo& robot : robots) {
@@ -134,6 +141,8 @@ void add_cloud(ReportData& data) {
     data.missing.emplace_back("map.ply is not there");
     return;
   }
+
+  // PLY, else PCD.
   data.cloud_file = fs::exists(result.ply(), ec) ? "map.ply" : "map.pcd";
   auto cloud = maps::read_result_cloud(result);
   if (cloud) {
@@ -187,6 +196,7 @@ core::Result<ReportData> read_report_data(const fs::path& folder) {
     return core::input_error(
         fmt::format("{}: the run is still going on; report when it has ended", folder.string()));
 
+  // An interrupted run can be continued.
   const bool interrupted = fs::exists(folder / maps::kUnfinishedMarker, ec) ||
                            (!fs::exists(folder, ec) && fs::is_regular_file(partial / "map.db", ec));
   if (interrupted) {
@@ -194,11 +204,13 @@ core::Result<ReportData> read_report_data(const fs::path& folder) {
         "{}: the run was interrupted; finish it with plumbline map --resume, then report", folder.string()));
   }
 
+  // Without a summary there is no report.
   const auto result = maps::open_result(folder);
   if (!result) return tl::unexpected<core::Error>(result.error());
   auto summary = read_summary(result->summary());
   if (!summary) return tl::unexpected<core::Error>(summary.error());
 
+  // Name and axes of the result.
   ReportData data;
   data.folder = folder;
   const fs::path normal = fs::absolute(folder).lexically_normal();
@@ -206,10 +218,13 @@ core::Result<ReportData> read_report_data(const fs::path& folder) {
   data.summary = std::move(*summary);
   data.z_up = text_at(data.summary, "/frame/up") != "none";
 
+  // Paths before frames, which need them.
   add_paths(data);
   data.fused_afterwards = fused_afterwards(folder);
   add_frames(data);
   data.kind = kind_of(data);
+
+  // A lone map.db lacks everything else.
   if (!data.kind.empty()) data.missing.clear();
   add_store(data);
   if (data.kind.empty()) add_cloud(data);

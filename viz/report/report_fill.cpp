@@ -45,6 +45,8 @@ std::string filled(const Json& json, const std::string& pattern) {
     const std::size_t open = std::min(pattern.find('{', at), pattern.size());
     text += pattern.substr(at, open - at);
     if (open == pattern.size()) break;
+
+    // A name in braces becomes its value.
     const std::size_t close = pattern.find('}', open);
     text += value_of(json, pattern.substr(open + 1, close - open - 1));
     at = close + 1;

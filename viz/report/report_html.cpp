@@ -21,6 +21,8 @@ std::string count_text(double count) {
   if (!std::isfinite(count)) return kUnknown;
   const std::string digits = fmt::format("{:.0f}", std::abs(count));
   std::string out = count < -0.5 ? "-" : "";
+
+  // Groups of three digits.
   for (std::size_t i = 0; i < digits.size(); ++i) {
     if (i > 0 && (digits.size() - i) % 3 == 0) out += kThinSpace;
     out += digits[i];
@@ -80,11 +82,15 @@ std::string RobotTable::html() const {
   if (names_.empty() || rows_.empty()) return {};
   const bool named = names_.size() > 1 || !names_.front().empty();
   std::string out = "<div class=\"scroll\"><table class=\"facts\">";
+
+  // A single robot needs no name.
   if (named) {
     out += "<thead><tr><th></th>";
     for (const std::string& name : names_) out += "<th class=\"n\">" + markup_text(name) + "</th>";
     out += "</tr></thead>\n";
   }
+
+  // One row per quantity, one cell per robot.
   out += "<tbody>";
   for (const auto& [name, values] : rows_) {
     out += "<tr><th scope=\"row\">" + markup_text(name) + "</th>";
@@ -124,6 +130,8 @@ std::string folded(const std::string& title, const std::string& html, bool open)
 std::string page_html(const std::string& title, const std::string& head_html,
                       const std::vector<Section>& sections, const std::string& foot) {
   std::string contents, body, behind;
+
+  // Sections without text are left out.
   for (const Section& section : sections) {
     if (section.html.empty()) continue;
     contents += fmt::format("<a href=\"#{}\">{}</a>", section.id, markup_text(section.title));
@@ -131,6 +139,7 @@ std::string page_html(const std::string& title, const std::string& head_html,
                                                     section.id, markup_text(section.title), section.html);
   }
 
+  // Details are folded.
   if (!behind.empty())
     body += "<details class=\"made\"><summary>How it was made</summary>\n" + behind + "</details>\n";
 

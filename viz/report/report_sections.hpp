@@ -17,12 +17,12 @@ std::string run_html(const ReportData& data);
 /// The folder's snapshots; if it has none, they are drawn now. `scratch`: folder for temporary pictures.
 core::Result<std::string> pictures_html(ReportData& data, const std::filesystem::path& scratch);
 /// The map to turn and walk through; empty without a cloud. If it cannot be shown, `data` says so. Errors
-/// (kInput): request.other cannot be read; (kUntrustworthy): it cannot be laid over the map.
+/// (kInput): request.other cannot be read; (kUntrustworthy): it cannot be aligned with the map.
 core::Result<std::string> viewer_html(ReportData& data, const ReportRequest& request,
                                       const core::Executor& executor, core::Log& log);
 /// The paths from above, over the plan of the cloud.
 std::string path_html(const ReportData& data);
-/// Exports that lie in the folder.
+/// Exports in the folder.
 std::string exports_html(const ReportData& data);
 std::string tracking_html(const ReportData& data);
 std::string loops_html(const ReportData& data);

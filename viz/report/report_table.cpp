@@ -31,6 +31,8 @@ core::Result<CsvTable> CsvTable::read(const std::filesystem::path& file) {
       const core::CsvField read = core::next_csv_field(table.text_, at);
       last = read.last;
       const std::string value = core::csv_text(read.field);
+
+      // The first row names the columns.
       if (row == 0) {
         table.columns_.push_back(value);
         continue;
@@ -41,6 +43,7 @@ core::Result<CsvTable> CsvTable::read(const std::filesystem::path& file) {
       table.cells_.push_back({begin, value.size()});
     }
 
+    // Every line must have all columns.
     if (cells != table.columns_.size()) {
       return core::input_error(fmt::format("{} is damaged: line {} has {} columns of {}", name, row + 1,
                                            cells, table.columns_.size()));

@@ -15,7 +15,7 @@ namespace {
 constexpr Rgb kInk{45, 48, 54};
 constexpr Rgb kFaint{110, 114, 122};
 constexpr Rgb kWhite{255, 255, 255};
-constexpr Rgb kGround{250, 250, 248};  // background of text that points may lie behind
+constexpr Rgb kGround{250, 250, 248};  // background of text in front of points
 constexpr double kTextSize = 22.0;     // in pixels, if the picture is 1200 px high
 
 Eigen::Vector2d on_picture(const Projection& projection, const Eigen::Vector3d& p) {
@@ -35,10 +35,13 @@ void cased_line(Painter& painter, const std::vector<Eigen::Vector2d>& line, cons
 void draw_path(Painter& painter, const Projection& projection, const CameraPath& path) {
   std::vector<std::vector<Eigen::Vector2d>> pieces(1);
 
+  // Points behind the viewer split the path.
   for (const auto& pose : path.trajectory) {
     const Eigen::Vector3d& p = pose.world_from_camera.translation;
     if (in_front(projection, p)) {
       const Eigen::Vector2d at = on_picture(projection, p);
+
+      // Points less than a pixel apart add nothing.
       const bool moved = pieces.back().empty() || (at - pieces.back().back()).norm() > painter.scale();
       if (moved) pieces.back().push_back(at);
     } else if (!pieces.back().empty()) {
@@ -47,10 +50,13 @@ void draw_path(Painter& painter, const Projection& projection, const CameraPath&
   }
 
   for (const auto& piece : pieces) cased_line(painter, piece, path.color, 3.0);
+
+  // Empty pieces have no ends to mark.
   pieces.erase(std::remove_if(pieces.begin(), pieces.end(), [](const auto& piece) { return piece.empty(); }),
                pieces.end());
   if (pieces.empty()) return;
 
+  // Disc at the end, ring at the start.
   painter.disc(pieces.back().back(), 8.5, kWhite);
   painter.disc(pieces.back().back(), 7.0, path.color);
   painter.disc(pieces.front().front(), 9.5, kWhite);
@@ -63,6 +69,7 @@ struct LegendEntry {
   bool line = false;
 };
 
+/// Robots by the colour of their points, paths by that of their lines.
 std::vector<LegendEntry> legend_entries(const OverlayContent& content) {
   std::vector<LegendEntry> entries;
   if (content.options->color == ColorMode::kRobot) {
@@ -81,6 +88,7 @@ void draw_title_and_legend(Painter& painter, const OverlayContent& content) {
   double y = content.projection.height_px - 40.0 * s;
   const double x = 36.0 * s;
 
+  // A veil keeps text readable over points.
   if (!content.scene->title.empty()) {
     const double width = painter.text_width(content.scene->title, 30.0, true);
     painter.rectangle({x - 8.0 * s, y - 24.0 * s}, {width + 16.0 * s, 48.0 * s}, kGround, 0.8);
@@ -88,6 +96,7 @@ void draw_title_and_legend(Painter& painter, const OverlayContent& content) {
     y -= 46.0 * s;
   }
 
+  // The longest entry sets the width.
   const auto entries = legend_entries(content);
   double widest = 0.0;
   for (const auto& entry : entries) widest = std::max(widest, painter.text_width(entry.text, kTextSize));
@@ -97,6 +106,7 @@ void draw_title_and_legend(Painter& painter, const OverlayContent& content) {
   const double height = line_height * static_cast<double>(entries.size()) + 12.0 * s;
   painter.rectangle({x - 8.0 * s, y + 22.0 * s - height}, {widest + 66.0 * s, height}, kGround, 0.8);
 
+  // Lines for paths, squares for robots.
   for (const auto& entry : entries) {
     if (entry.line) {
       painter.polyline({{x, y}, {x + 36.0 * s, y}}, entry.color, 4.0);
@@ -135,18 +145,21 @@ void draw_axes(Painter& painter, const OverlayContent& content) {
   constexpr double kLength = 48.0;
   painter.rectangle(origin - Eigen::Vector2d(72.0 * s, 72.0 * s), {144.0 * s, 144.0 * s}, kGround, 0.6);
 
+  // Near axes cover far ones.
   const std::array<Rgb, 3> colors{{{200, 50, 50}, {40, 150, 60}, {45, 90, 200}}};
   const std::array<const char*, 3> names{"x", "y", "z"};
   std::array<int, 3> order{0, 1, 2};  // sorted below: axes that point away from the viewer first
   std::sort(order.begin(), order.end(),
             [&projection](int a, int b) { return projection.forward[a] > projection.forward[b]; });
 
+  // Each axis as the viewer sees it.
   for (const int axis : order) {
     const Eigen::Vector2d direction(projection.right[axis], projection.up[axis]);
     const Eigen::Vector2d tip = origin + kLength * s * direction;
     const auto i = static_cast<std::size_t>(axis);
     cased_line(painter, {origin, tip}, colors[i], 3.5);
 
+    // An axis along the line of sight is a dot.
     if (direction.norm() < 0.25) {
       painter.disc(tip, 5.0, colors[i]);
       painter.text(origin + Eigen::Vector2d(-18.0 * s, -18.0 * s), names[i], kTextSize, colors[i],
@@ -179,6 +192,7 @@ void draw_color_bar(Painter& painter, const ColorScale& scale, const Eigen::Vect
   }
 }
 
+/// Colour bar in the upper right corner; none for colours without values.
 void draw_value_scale(Painter& painter, const OverlayContent& content) {
   const ColorScale& scale = content.color_scale;
   if (!scale.shown) return;
@@ -207,6 +221,7 @@ void draw_paths(Painter& painter, const OverlayContent& content) {
 }
 
 void draw_annotations(Painter& painter, const OverlayContent& content) {
+  // An empty map is named even without annotations.
   if (content.empty) {
     painter.text({0.5 * content.projection.width_px, 0.5 * content.projection.height_px}, "empty map", 48.0,
                  kFaint, Anchor::kCentre);

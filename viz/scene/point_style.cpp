@@ -70,6 +70,7 @@ Rgb robot_color(float robot) {
                                                : Rgb{150, 150, 150};
 }
 
+/// One channel per axis of the scene; grey without a normal.
 Rgb normal_color(const Point& p, const SceneAxes& axes) {
   const Eigen::Vector3d n = normal(p);
   if (!(n.norm() > 0.1)) return {150, 150, 150};
@@ -80,6 +81,7 @@ Rgb normal_color(const Point& p, const SceneAxes& axes) {
   return {channel(axes.right), channel(axes.forward), channel(axes.up)};
 }
 
+/// Colours before shading, and the scale that explains them.
 PointColors base_colors(const Scene& scene, const std::vector<std::uint32_t>& points,
                         const SnapshotOptions& options, const SceneAxes& axes) {
   const auto& cloud = *scene.cloud;
@@ -100,6 +102,8 @@ PointColors base_colors(const Scene& scene, const std::vector<std::uint32_t>& po
       std::vector<double> heights;
       heights.reserve(points.size());
       for (const auto i : points) heights.push_back(position(cloud[i]).dot(axes.up));
+
+      // Quantiles, for outliers must not stretch the scale.
       const double floor = core::quantile(heights, 0.01, 0.0);
       for (double& h : heights) h -= floor;
       const double top = std::max(0.1, core::quantile(heights, 0.98, 0.0));
@@ -112,6 +116,8 @@ PointColors base_colors(const Scene& scene, const std::vector<std::uint32_t>& po
       std::vector<double> values;
       values.reserve(points.size());
       for (const auto i : points) values.push_back(scene.scalars[i]);
+
+      // The map's name of its values comes first.
       const std::string fallback =
           options.color == ColorMode::kError ? "error (m)" : color_mode_name(options.color);
       return color_by_value(values, options.scalar_range.value_or(value_range(values)),
@@ -155,6 +161,7 @@ std::vector<std::uint32_t> visible_points(const Scene& scene, const Projection& 
   std::vector<std::uint32_t> facing;
   if (scene.cloud == nullptr) return all;
 
+  // Surroundings smooth noisy normals.
   const auto& cloud = *scene.cloud;
   all.reserve(cloud.size() / step + 1);
   std::optional<Surroundings> surroundings;
@@ -178,6 +185,7 @@ std::vector<std::uint32_t> visible_points(const Scene& scene, const Projection& 
   return cull && enough ? facing : all;
 }
 
+/// The nearest point of each cell, for it covers farther ones.
 std::vector<std::uint32_t> nearest_per_cell(const Scene& scene, const std::vector<std::uint32_t>& points,
                                             const Projection& projection, double cell_px) {
   constexpr std::uint32_t kNone = 0xffffffffU;
@@ -187,6 +195,7 @@ std::vector<std::uint32_t> nearest_per_cell(const Scene& scene, const std::vecto
   const auto cells = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
   std::vector<std::uint32_t> nearest(cells, kNone);
 
+  // Points outside the grid cannot be seen.
   std::vector<float> depth(cells, std::numeric_limits<float>::infinity());
   for (const auto i : points) {
     const Eigen::Vector3d at = projection.project(position((*scene.cloud)[i]));
@@ -196,12 +205,14 @@ std::vector<std::uint32_t> nearest_per_cell(const Scene& scene, const std::vecto
                         at.z() > projection.near_m && at.z() < projection.far_m;
     if (!inside) continue;
 
+    // Depth test within the cell.
     const auto cell = static_cast<std::size_t>(row * columns + column);
     if (static_cast<float>(at.z()) >= depth[cell]) continue;
     depth[cell] = static_cast<float>(at.z());
     nearest[cell] = i;
   }
 
+  // In the order of the cloud.
   nearest.erase(std::remove(nearest.begin(), nearest.end(), kNone), nearest.end());
   std::sort(nearest.begin(), nearest.end());
   return nearest;
@@ -214,6 +225,7 @@ double point_spacing(const Scene& scene, const std::vector<std::uint32_t>& point
   constexpr int kCells = 128;
   Eigen::Vector3d low, high;
 
+  // Extent without outliers, from a sample.
   const std::size_t step = std::max<std::size_t>(1, points.size() / 20000);
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
@@ -224,6 +236,7 @@ double point_spacing(const Scene& scene, const std::vector<std::uint32_t>& point
     high[axis] = core::quantile(values, 0.99, 0.0);
   }
 
+  // Occupied cubes measure the surface.
   const double side = std::max((high - low).maxCoeff() / kCells, 1e-4);
   std::vector<std::uint32_t> count(static_cast<std::size_t>(kCells) * kCells * kCells, 0);
   for (const auto i : points) {

@@ -42,6 +42,8 @@ void Raster::draw_point(const Eigen::Vector3d& at, double diameter_px, const Rgb
         at.y() - radius < first_row_ + depth_.rows)) {
     return;
   }
+
+  // The disc, row by row.
   const int end = first_from(at.y() + radius);
   for (int row = first_from(at.y() - radius); row < end; ++row) {
     const double up = row + 0.5 - at.y();
@@ -74,6 +76,7 @@ void Raster::draw_line(const Eigen::Vector3d& from, const Eigen::Vector3d& to, d
       last = std::min(last, from.x() + b);
     };
 
+    // Sides, then ends of the rectangle.
     limit(unit.y(), -up * unit.x(), -half, half);
     limit(unit.x(), up * unit.y(), 0.0, length);
     for (int x = std::max(first_from(first), 0); x < std::min(first_from(last), depth_.cols); ++x) {

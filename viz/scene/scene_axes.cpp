@@ -63,6 +63,7 @@ Eigen::Vector3d along_walls(const std::vector<Eigen::Vector3d>& normals, const E
   std::array<double, 90> count{};
   double total = 0.0;
 
+  // Histogram of wall directions, modulo 90 degrees.
   std::vector<double> angles;
   for (const Eigen::Vector3d& n : normals) {
     if (std::abs(n.dot(up)) > 0.25) continue;
@@ -73,6 +74,7 @@ Eigen::Vector3d along_walls(const std::vector<Eigen::Vector3d>& normals, const E
     total += 1.0;
   }
 
+  // The strongest window of nine degrees.
   std::size_t peak = 0;
   double best = -1.0;
   for (std::size_t i = 0; i < 90; ++i) {
@@ -84,7 +86,10 @@ Eigen::Vector3d along_walls(const std::vector<Eigen::Vector3d>& normals, const E
     }
   }
 
+  // Directions must stand out from a uniform spread.
   if (total < 100.0 || best < 1.6 * total * 9.0 / 90.0) return forward;
+
+  // Mean offset from the peak, for precision.
   double offset_sum = 0.0;
   double used = 0.0;
   for (const double angle : angles) {
@@ -105,6 +110,7 @@ Eigen::Vector3d mean_camera_up(const std::vector<geometry::Trajectory>& paths) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const geometry::Trajectory& path : paths) {
     for (const auto& pose : path) {
+      // y of a camera points down.
       if (pose.world_from_camera.rotation.allFinite()) sum -= pose.world_from_camera.rotation.col(1);
     }
   }

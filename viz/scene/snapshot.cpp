@@ -55,6 +55,7 @@ class Overlay : public vtkContextItem {
   static Overlay* New();
   vtkTypeMacro(Overlay, vtkContextItem);
   bool Paint(vtkContext2D* context) override {
+    // The canvas is one band of the picture.
     vtkNew<vtkTransform2D> to_band;
     to_band->Translate(0.0, -band->first);
     context->PushMatrix();
@@ -78,6 +79,7 @@ core::Result<void> check(const Scene& scene, const SnapshotOptions& options) {
                                          options.width_px, options.height_px));
   }
 
+  // Every point needs a value.
   const bool by_scalar = options.color == ColorMode::kRobot || options.color == ColorMode::kError ||
                          options.color == ColorMode::kConfidence;
   const std::size_t points = scene.cloud == nullptr ? 0 : scene.cloud->size();
@@ -91,9 +93,12 @@ core::Result<void> check(const Scene& scene, const SnapshotOptions& options) {
     return core::usage_error("colour range: the lower end must be below the upper end");
   }
 
+  // The viewpoint must define a direction.
   if (options.view == View::kExplicit) {
     const Eigen::Vector3d forward = options.viewpoint.target - options.viewpoint.eye;
     const double angle = options.viewpoint.field_of_view_deg;
+
+    // Up along the line of sight leaves the roll open.
     if (!forward.allFinite() || !options.viewpoint.up.allFinite() ||
         !(forward.cross(options.viewpoint.up).norm() > 1e-9) || !(angle > 1.0 && angle < 170.0)) {
       return core::usage_error(
@@ -148,10 +153,14 @@ Projection choose_projection(const Scene& scene, const SnapshotOptions& options,
   const std::size_t size = scene.cloud == nullptr ? 0 : scene.cloud->size();
   const std::size_t step = std::max<std::size_t>(1, size / kFramingSample);
   const auto sample = positions(scene, visible_points(scene, for_culling, options.cull_back_faces, step));
+
+  // Named views fit the scene into the picture.
   if (!fixed) {
     fit(directions, evened(sample), must_see(scene, sample.empty()), width_of_scale(options));
     return directions;
   }
+
+  // A far plane behind nearly everything.
   std::vector<double> depths;
   depths.reserve(sample.size());
   for (const auto& p : sample) depths.push_back((p - directions.eye).dot(directions.forward));
@@ -171,6 +180,8 @@ std::vector<int> point_sizes(const Scene& scene, const std::vector<std::uint32_t
 
   for (const std::uint32_t k : points) {
     double size = options.point_size_px * kSupersampling;
+
+    // Without a size, points must close surfaces.
     if (size <= 0.0) {
       const Eigen::Vector3d p = scene.cloud->at(k).getVector3fMap().cast<double>();
       const double depth = (p - projection.eye).dot(projection.forward);
@@ -197,16 +208,19 @@ struct Drawn {
 };
 
 Drawn choose_what_to_draw(const Scene& scene, const SnapshotOptions& options) {
+  // Drawn larger and scaled down, against aliasing.
   SnapshotOptions large = options;
   large.width_px *= kSupersampling;
   large.height_px *= kSupersampling;
 
+  // View and projection come before the points.
   const SceneAxes axes = scene_axes(scene, large);
   Drawn drawn;
   drawn.content.scene = &scene;
   drawn.content.options = &options;
   drawn.content.projection = choose_projection(scene, large, axes);
 
+  // Only points that can be visible.
   const Projection& projection = drawn.content.projection;
   const auto facing = visible_points(scene, projection, options.cull_back_faces);
   drawn.spacing_m = point_spacing(scene, facing);
@@ -214,6 +228,7 @@ Drawn choose_what_to_draw(const Scene& scene, const SnapshotOptions& options) {
   drawn.styled = color_points(scene, drawn.points, options, axes, projection);
   drawn.sizes = point_sizes(scene, drawn.points, options, projection, drawn.spacing_m);
 
+  // Positions in pixels.
   for (const Eigen::Vector3d& p : positions(scene, drawn.points))
     drawn.places.push_back(projection.project(p));
   drawn.content.color_scale = drawn.styled.scale;
@@ -276,6 +291,8 @@ class Renderer {
 
   core::Result<void> open(const SnapshotOptions& options) {
     const cv::Size size{kSupersampling * options.width_px, band_height(options)};
+
+    // An open window of that size is used again.
     if (window_ != nullptr && size == size_) return {};
     window_.reset();
     rasters_.clear();
@@ -289,6 +306,7 @@ class Renderer {
 
   /// In the window that is open.
   cv::Mat3b draw(const Scene& scene, const SnapshotOptions& options, const Drawn& drawn) {
+    // The overlay has transparent ground.
     Band band;
     band.height = size_.height;
     vtkNew<vtkRenderer> renderer;
@@ -296,6 +314,7 @@ class Renderer {
     renderer->SetBackgroundAlpha(0.0);
     window_->window()->AddRenderer(renderer);
 
+    // Lines and text by VTK's two-dimensional painter.
     vtkNew<Overlay> overlay;
     overlay->content = &drawn.content;
     overlay->band = &band;
@@ -306,14 +325,19 @@ class Renderer {
     cv::Mat3b picture(options.height_px, options.width_px);
     std::array<core::Executor::Job, kAtATime> jobs;
 
+    // Points are drawn while VTK draws the next band.
     for (int first_px = 0, k = 0; first_px < picture.rows; first_px += kBand_px, ++k) {
       band.first = kSupersampling * first_px - kMargin;
       const std::size_t place = static_cast<std::size_t>(k) % kAtATime;
+
+      // The raster must be free.
       jobs[place].wait();
       jobs[place] = executor_.submit(
           [&, first_px, first = band.first, &raster = rasters_[place], over = window_->draw()] {
             raster.clear(first, kBackground);
             draw_band(scene, drawn, raster);
+
+            // The band without its margins.
             cv::Mat3b part = picture.rowRange(first_px, std::min(first_px + kBand_px, picture.rows));
             const cv::Range rows(kMargin, kMargin + kSupersampling * part.rows);
             cv::resize(composited(raster.picture().rowRange(rows), over.rowRange(rows)), part, part.size(),
@@ -321,6 +345,7 @@ class Renderer {
           });
     }
 
+    // Jobs write into the image.
     for (core::Executor::Job& job : jobs) job.wait();
     window_->window()->RemoveRenderer(renderer);
     return picture;
@@ -341,9 +366,10 @@ class Renderer {
 
 }  // namespace
 
-/// Only this thread calls VTK; selecting data, drawing points and writing pictures run beside it.
+/// Only this thread calls VTK; others select data, draw points and write pictures.
 core::Result<void> render_snapshots(const Scene& scene, const std::vector<Snapshot>& snapshots,
                                     const core::Executor& executor) {
+  // Mistakes are reported before anything is drawn.
   for (const Snapshot& snapshot : snapshots) {
     if (auto checked = check(scene, snapshot.options); !checked) return checked;
   }
@@ -352,6 +378,7 @@ core::Result<void> render_snapshots(const Scene& scene, const std::vector<Snapsh
   std::vector<core::Result<void>> written(snapshots.size());
   std::vector<core::Executor::Job> choosing, writing;
 
+  // Selection for the next one runs during drawing.
   const auto choose_next = [&] {
     const std::size_t i = choosing.size();
     if (i == snapshots.size()) return;
@@ -362,6 +389,7 @@ core::Result<void> render_snapshots(const Scene& scene, const std::vector<Snapsh
   Renderer renderer(executor);
   choose_next();
 
+  // One selection ahead, to limit memory.
   for (std::size_t i = 0; i < snapshots.size(); ++i) {
     if (auto opened = renderer.open(snapshots[i].options); !opened) return opened;
     choosing[i].wait();
@@ -372,6 +400,7 @@ core::Result<void> render_snapshots(const Scene& scene, const std::vector<Snapsh
         executor.submit([&, i, picture] { written[i] = write_png(picture, snapshots[i].file); }));
   }
 
+  // The first failure, in the order of requests.
   for (std::size_t i = 0; i < snapshots.size(); ++i) {
     writing[i].wait();
     if (!written[i]) return written[i];

@@ -28,6 +28,8 @@ struct SceneExtent {
 SceneExtent extent_of(const Scene& scene) {
   constexpr std::size_t kSample = 100000;
   std::vector<Eigen::Vector3d> points;
+
+  // A sample suffices for the extent.
   if (scene.cloud != nullptr) {
     const std::size_t step = std::max<std::size_t>(1, scene.cloud->size() / kSample);
     for (std::size_t i = 0; i < scene.cloud->size(); i += step) {
@@ -37,6 +39,7 @@ SceneExtent extent_of(const Scene& scene) {
     points = evened(points);
   }
 
+  // The whole path must be visible.
   for (const CameraPath& path : scene.paths) {
     for (const auto& pose : path.trajectory) points.push_back(pose.world_from_camera.translation);
   }
@@ -44,6 +47,7 @@ SceneExtent extent_of(const Scene& scene) {
   SceneExtent extent;
   if (points.empty()) return extent;
 
+  // Quantiles, for outliers must not shift the centre.
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
     values.reserve(points.size());
@@ -51,6 +55,7 @@ SceneExtent extent_of(const Scene& scene) {
     extent.centre[axis] = 0.5 * (core::quantile(values, 0.01, 0.0) + core::quantile(values, 0.99, 0.0));
   }
 
+  // Radius that holds nearly all points.
   std::vector<double> distances;
   distances.reserve(points.size());
   for (const auto& p : points) distances.push_back((p - extent.centre).norm());
@@ -66,6 +71,7 @@ core::Result<void> render_turntable(const Scene& scene, const SnapshotOptions& o
   if (pictures < 2) return core::usage_error("turntable: at least 2 pictures are needed");
   if (auto made = core::make_folder(folder); !made) return made;
 
+  // The camera circles the centre.
   SnapshotOptions view = options;
   const SceneAxes axes = scene_axes(scene, options);
   const SceneExtent extent = extent_of(scene);
@@ -75,6 +81,7 @@ core::Result<void> render_turntable(const Scene& scene, const SnapshotOptions& o
   view.viewpoint.target = extent.centre;
   view.viewpoint.field_of_view_deg = kFieldOfView_deg;
 
+  // Far enough to see the whole extent.
   const double distance = 1.02 * extent.radius_m / std::sin(0.5 * kFieldOfView_deg * M_PI / 180.0);
   for (int k = 0; k < pictures; ++k) {
     const double turn = 2.0 * M_PI * k / pictures;

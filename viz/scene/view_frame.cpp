@@ -114,6 +114,7 @@ static Eigen::Vector3d iso_forward(const SceneAxes& axes) {
          std::sin(kIsoPitch) * axes.up;
 }
 
+/// Line of sight of a view.
 static Eigen::Vector3d forward_of(const SnapshotOptions& options, const SceneAxes& axes) {
   switch (options.view) {
     case View::kIso:
@@ -154,6 +155,8 @@ Projection view_directions(const SnapshotOptions& options, const SceneAxes& axes
   if (given) view.eye = options.viewpoint.eye;
   view.orthographic = options.view != View::kIso && !given;
   const double field_of_view = given ? options.viewpoint.field_of_view_deg * kDegree : kIsoFieldOfView;
+
+  // Up becomes perpendicular to the line of sight.
   view.right = view.forward.cross(view.up).normalized();
   view.up = view.right.cross(view.forward);
   view.width_px = options.width_px;
@@ -173,6 +176,7 @@ void fit(Projection& projection, const std::vector<Eigen::Vector3d>& points,
       0.5 * ((x.low + x.high) * projection.right + (y.low + y.high) * projection.up +
              (z.low + z.high) * projection.forward);
 
+  // Distance of the eye, or scale of the plan.
   double distance = 2.0 * depth + 1.0;
   if (projection.orthographic) {
     fit_orthographic(projection, x, y, width_px);

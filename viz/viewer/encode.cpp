@@ -40,6 +40,7 @@ std::uint64_t mixed(std::uint64_t value) {
   return value ^ value >> 29U;
 }
 
+/// Raw deflate stream of the bytes.
 std::string packed(const std::vector<std::uint8_t>& bytes) {
   const std::unique_ptr<libdeflate_compressor, decltype(&libdeflate_free_compressor)> compressor(
       core::made(libdeflate_alloc_compressor(kCompression)), &libdeflate_free_compressor);
@@ -98,6 +99,7 @@ Grid on_grid(const Points& points, bool z_up, EncodedCloud& out) {
   for (int k = 0; k < 3; ++k)
     out.origin[static_cast<std::size_t>(k)] = std::floor(low[k] / out.step_m) * out.step_m;
 
+  // Codes sort points along the Morton curve.
   std::vector<Steps> steps(count);
   std::vector<std::pair<std::uint64_t, std::size_t>> sorted(count);
   for (std::size_t i = 0; i < count; ++i) {
@@ -111,6 +113,7 @@ Grid on_grid(const Points& points, bool z_up, EncodedCloud& out) {
   }
   std::sort(sorted.begin(), sorted.end());
 
+  // Steps and numbers in that order.
   Grid grid;
   grid.steps.reserve(count);
   for (const auto& [code, i] : sorted) {
@@ -171,6 +174,7 @@ std::string packed_points(const Points& points, const Grid& grid, const std::vec
   const std::size_t n = chosen.size();
   std::vector<std::uint8_t> bytes((points.colored ? 9 : 6) * n);
 
+  // Differences of successive points compress well.
   Steps before{};
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t k = 0; k < 3; ++k) {
@@ -180,8 +184,11 @@ std::string packed_points(const Points& points, const Grid& grid, const std::vec
     }
     before = grid.steps[chosen[i]];
   }
+
+  // Without colours that is all.
   if (!points.colored) return packed(bytes);
 
+  // Colours, with reduced chrominance.
   std::array<Plane, 3> planes{Plane(bytes, 6 * n), Plane(bytes, 7 * n), Plane(bytes, 8 * n)};
   for (const std::size_t i : chosen) {
     const auto& [r, g, b] = points.colors[grid.order[i]];
@@ -215,6 +222,8 @@ std::string packed_normals(const Points& points, const Grid& grid, const std::ve
   for (const std::size_t i : chosen) {
     const auto& [x, y, z] = points.normals[grid.order[i]];
     const Eigen::Vector3d normal = shown({x, y, z}, z_up);
+
+    // Zero stands for unknown normals.
     const bool known = normal.allFinite() && normal.squaredNorm() > 0.25;
     const std::array<int, 2> at = known ? folded(normal) : std::array<int, 2>{};
     first.put(at[0]);
@@ -243,6 +252,7 @@ std::string packed_layer(const Layer& layer, const Grid& grid, const std::vector
   for (const std::size_t i : chosen) {
     const int step = step_of(layer, layer.values[grid.order[i]]);
     if (wide) {
+      // All low bytes, then all high bytes.
       bytes[at] = static_cast<std::uint8_t>(step & 0xFF);
       bytes[n + at++] = static_cast<std::uint8_t>(step >> 8);
     } else {
@@ -276,11 +286,13 @@ EncodedCloud encode(const Points& points, bool z_up) {
                        static_cast<double>(std::max<std::size_t>(cells[edge], 1));
   out.spacing_m.back() = out.step_m * static_cast<double>(1U << edge) / std::sqrt(share);
 
+  // Chunks of one level.
   for (std::size_t l = 0; l < bits.size(); ++l) {
     std::vector<std::size_t> chosen;
     const auto flush = [&] {
       if (chosen.empty()) return;
 
+      // Extent of the chunk.
       Chunk chunk;
       chunk.level = static_cast<int>(l);
       chunk.count = chosen.size();
@@ -292,6 +304,7 @@ EncodedCloud encode(const Points& points, bool z_up) {
         }
       }
 
+      // Packed data of the chunk.
       chunk.points = packed_points(points, grid, chosen);
       if (!points.normals.empty()) chunk.normals = packed_normals(points, grid, chosen, z_up);
       for (const Layer& layer : points.layers) chunk.layers.push_back(packed_layer(layer, grid, chosen));
@@ -299,6 +312,7 @@ EncodedCloud encode(const Points& points, bool z_up) {
       chosen.clear();
     };
 
+    // Points in order, until a chunk is full.
     for (std::size_t i = 0; i < count; ++i) {
       if (level[i] != l) continue;
       chosen.push_back(i);

@@ -12,7 +12,7 @@
 
 namespace plumbline::viewer {
 
-/// Up to kChunk points of one level that lie near each other.
+/// Up to kChunk points of one level that are near each other.
 struct Chunk {
   int level = 0;
   std::size_t count = 0;

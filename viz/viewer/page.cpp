@@ -77,12 +77,14 @@ Json cloud_json(const Points& points, bool z_up, Pieces& pieces, Cost& cost) {
   json["layers"] = Json::array();
   for (const Layer& layer : points.layers) json["layers"].push_back(layer_json(layer));
 
+  // Chunks refer to pieces by number.
   json["chunks"] = Json::array();
   cost.points += points.positions.size();
   for (const Chunk& chunk : encoded.chunks) {
     Json data = Json::array({pieces.add(chunk.points)});
     cost.place_and_color += pieces.base64.back().size();
 
+    // Normals and layers, if there are any.
     data.push_back(chunk.normals.empty() ? -1 : pieces.add(chunk.normals));
     if (!chunk.normals.empty()) cost.normals += pieces.base64.back().size();
     for (const std::string& layer : chunk.layers) {
@@ -90,6 +92,7 @@ Json cloud_json(const Points& points, bool z_up, Pieces& pieces, Cost& cost) {
       cost.layers += pieces.base64.back().size();
     }
 
+    // The chunk with its extent.
     json["chunks"].push_back({{"level", chunk.level},
                               {"count", chunk.count},
                               {"low", chunk.low},
@@ -119,17 +122,21 @@ void add_samples(const Keyframe& keyframe, bool z_up, Json& json) {
   std::vector<double> motions;
   std::array<double, 2> most{1e-12, 1e-12};
 
+  // Scales of shift and turn are separate.
   for (const geometry::Vector6d& motion : *keyframe.in_camera) {
     if (!motion.allFinite()) return;
     for (const int part : {0, 1}) {
       const Eigen::Vector3d v =
           shown(keyframe.world_from_camera.rotation * motion.segment<3>(3 * part), z_up);
       motions.insert(motions.end(), v.data(), v.data() + 3);
+
+      // The largest component sets the step.
       auto& of_part = most[static_cast<std::size_t>(part)];
       of_part = std::max(of_part, v.lpNorm<Eigen::Infinity>());
     }
   }
 
+  // Steps of 16 bits keep the page small.
   std::string bytes;
   for (std::size_t i = 0; i < motions.size(); ++i) {
     const auto step = static_cast<std::uint16_t>(std::lround(32000.0 * motions[i] / most[i / 3 % 2]));
@@ -151,7 +158,9 @@ Json segments_json(const std::vector<Segment>& segments, bool z_up) {
 /// Corners of the box without the outer hundredth of the points on either side, along each axis.
 Json inmost_json(const Scene& scene) {
   std::array<std::vector<double>, 3> values;
+
   for (const Points& points : scene.clouds) {
+    // A sample suffices.
     const std::size_t step = 1 + points.positions.size() / 200000;
     for (std::size_t i = 0; i < points.positions.size(); i += step) {
       const auto& [x, y, z] = points.positions[i];
@@ -161,6 +170,7 @@ Json inmost_json(const Scene& scene) {
     }
   }
 
+  // Quantiles of one percent.
   Json low = Json::array();
   Json high = Json::array();
   for (std::vector<double>& all : values) {
@@ -170,6 +180,7 @@ Json inmost_json(const Scene& scene) {
     low.push_back(rounded(all[outer]));
     high.push_back(rounded(all[all.size() - 1 - outer]));
   }
+
   return Json::array({low, high});
 }
 
@@ -189,17 +200,21 @@ Json scene_json(const Scene& scene, Pieces& pieces, Cost& cost) {
   json["paths"] = Json::array();
   for (const CameraPath& path : scene.paths) json["paths"].push_back(path_json(path, scene.z_up));
 
+  // Keyframes with their poses.
   json["keyframes"] = Json::array();
   for (const Keyframe& k : scene.keyframes) {
     Json keyframe = {{"robot", k.robot},
                      {"t", rounded(k.stamp)},
                      {"p", numbers(shown(k.world_from_camera.translation, scene.z_up))},
                      {"q", turn_of(k.world_from_camera, scene.z_up)}};
+
+    // Pictures and pose errors may be unknown.
     if (!k.jpeg.empty()) keyframe["i"] = base64(k.jpeg);
     if (k.in_camera) add_samples(k, scene.z_up, keyframe);
     json["keyframes"].push_back(std::move(keyframe));
   }
 
+  // Lines, and arcs between matched keyframes.
   json["lines"] = segments_json(scene.lines, scene.z_up);
   json["arcs"] = Json::array();
   for (const Arc& arc : scene.arcs) {
@@ -208,10 +223,10 @@ Json scene_json(const Scene& scene, Pieces& pieces, Cost& cost) {
                             {"b", numbers(shown(arc.to, scene.z_up))}});
   }
 
+  // The floor plan.
   json["walls"] = segments_json(scene.walls, scene.z_up);
   json["doors"] = segments_json(scene.doors, scene.z_up);
   json["rooms"] = Json::array();
-
   for (const auto& [place, text] : scene.rooms)
     json["rooms"].push_back(Json::array({numbers(shown(place, scene.z_up)), text}));
   if (!scene.live.empty()) json["live"] = scene.live;
@@ -249,6 +264,7 @@ std::string element(const Scene& scene, const std::string& still, const std::str
   Pieces pieces;
   const std::string json = in_script(scene_json(scene, pieces, spent));
 
+  // The still text remains without scripts.
   std::string out = "<style>\n" + std::string(kStyle) + "</style>\n<div class=\"" + kind + "\">\n";
   out += "<div class=\"pv-still\" hidden=\"hidden\">" + still + "</div>\n";
   out += "<noscript>" + still + "</noscript>\n";
@@ -276,6 +292,8 @@ std::string base64(std::string_view bytes) {
     std::uint32_t three = 0;
     for (std::size_t k = 0; k < 3; ++k)
       three = three << 8U | (k < left ? static_cast<std::uint8_t>(bytes[i + k]) : 0U);
+
+    // Padding replaces missing bytes.
     for (std::size_t k = 0; k < 4; ++k) out += k <= left ? kDigits[three >> (18U - 6U * k) & 63U] : '=';
   }
   return out;

@@ -67,9 +67,9 @@ struct Comparison {
 /// For each point whether a map's cameras looked through it. Null: nobody knows.
 using LookedThrough = std::function<std::vector<std::uint8_t>(const std::vector<Eigen::Vector3f>& points)>;
 
-/// Both in one frame, in which `up` points upwards. What one surface lacks has vanished or appeared only
+/// `up` points upwards in the frame of both surfaces. What one surface lacks has vanished or appeared only
 /// where the other's cameras looked through it. The same for any number of threads.
-Comparison find_changes(const Surface& before, const Surface& after, const LookedThrough& through_before,
+Comparison find_changes(const SurfacePair& surfaces, const LookedThrough& through_before,
                         const LookedThrough& through_after, const Eigen::Vector3d& up,
                         const ChangeOptions& options, const core::Executor& executor);
 

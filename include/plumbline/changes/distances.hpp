@@ -21,6 +21,12 @@ struct Surface {
   bool oriented = true;                  ///< normals point to the side that the surface was seen from
 };
 
+/// The same place on two days, in one frame. The surfaces must outlive this.
+struct SurfacePair {
+  const Surface& before;
+  const Surface& after;
+};
+
 struct DistanceOptions {
   double diameter_m = 0.1;  ///< of the cylinder whose points are averaged
   double depth_m = 0.08;    ///< half its length: the largest distance
@@ -49,8 +55,8 @@ double detection_limit(const CylinderPoints& before, const CylinderPoints& after
 /// Distances at `cores` with their `normals`. `registration_m`: standard deviation of how the two clouds are
 /// laid together. The same for any number of threads.
 std::vector<Distance> distances(const std::vector<Eigen::Vector3f>& cores,
-                                const std::vector<Eigen::Vector3f>& normals, const Surface& before,
-                                const Surface& after, double registration_m, const DistanceOptions& options,
+                                const std::vector<Eigen::Vector3f>& normals, const SurfacePair& surfaces,
+                                double registration_m, const DistanceOptions& options,
                                 const core::Executor& executor);
 
 /// Standard deviation of the registration as places tell it: of the medians of blocks of half a metre, each

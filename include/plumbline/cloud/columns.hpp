@@ -13,8 +13,8 @@ namespace plumbline::cloud {
 /// The columns of the points `indices`, in this order.
 CloudColumns pick_columns(const CloudColumns& columns, const std::vector<std::size_t>& indices);
 
-/// Puts `more`, the columns of `added` points, behind `columns` of `size` points. What only one of the two
-/// has is 0 for the points of the other.
+/// Appends `more`, the columns of `added` points, to `columns` of `size` points. A column that only one of
+/// the two has is 0 for the points of the other.
 void append_columns(CloudColumns& columns, std::size_t size, const CloudColumns& more, std::size_t added);
 
 /// The columns of `before` for the points of `after`, which some filter made of it. Points are found again by

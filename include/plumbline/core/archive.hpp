@@ -50,6 +50,7 @@ class Archive {
   template <typename T>
   struct IsMatrix<T, std::void_t<decltype(T::RowsAtCompileTime)>> : std::true_type {};
 
+  /// A flag as one byte, a number, a matrix by rows, or whatever many() takes apart.
   template <typename T>
   void one(T& thing) {
     if constexpr (std::is_same_v<T, bool>) {
@@ -75,6 +76,7 @@ class Archive {
   void many(std::array<T, N>& things) {
     for (T& thing : things) one(thing);
   }
+  /// A flag, then the value if there is one.
   template <typename T>
   void many(std::optional<T>& thing) {
     bool there = thing.has_value();
@@ -163,6 +165,7 @@ class ByteReader : public Archive<ByteReader> {
   void number(T& value) {
     planes(&value, 1);
   }
+  /// Reads what ByteWriter::planes() wrote: the highest bytes are shifted in first.
   template <std::size_t kBytes, typename T>
   void planes(T* values, std::size_t n) {
     const std::uint8_t* from = take(n * kBytes);

@@ -107,6 +107,8 @@ OptionTable& OptionTable::choice(std::string key, Enum& value,
   spec.type = OptionType::kChoice;
   spec.help = std::move(help);
   for (const auto& [name, unused] : allowed) spec.choices.push_back(name);
+
+  // Names are parsed and printed through the same pairs
   Binding binding;
   binding.parse = [&value, allowed](const ConfigNode& node) -> std::string {
     for (const auto& [name, v] : allowed) {
@@ -117,6 +119,7 @@ OptionTable& OptionTable::choice(std::string key, Enum& value,
     }
     return "is not one of the choices";
   };
+
   binding.print = [&value, allowed]() -> std::string {
     for (const auto& [name, v] : allowed) {
       if (v == value) return name;

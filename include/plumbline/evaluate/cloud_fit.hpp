@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// One cloud laid onto another, as evaluate_cloud aligns a cloud with its reference.
+// Alignment of one cloud with another, as evaluate_cloud aligns a cloud with its reference.
 #include "plumbline/core/executor.hpp"
 #include "plumbline/evaluate/surface.hpp"
 #include "plumbline/geometry/rigid3.hpp"

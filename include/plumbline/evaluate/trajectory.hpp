@@ -72,8 +72,8 @@ struct BodyReport {
   double lever_m = 0.0;
   double turn_deg = 0.0;
   bool removed = false;  ///< true: the errors of the report are those without it; false: it was only found
-  double ate_before_m = 0.0;  ///< RMS while it is in
-  double ate_after_m = 0.0;   ///< RMS with it taken out
+  double ate_before_m = 0.0;  ///< RMS before it is removed
+  double ate_after_m = 0.0;   ///< RMS after it is removed
   double orientation_before_deg = 0.0;
   double orientation_after_deg = 0.0;
 };

@@ -13,7 +13,7 @@ namespace plumbline::features {
 /// position loses it.
 void undo_point_depth_delay(FrameFeatures& features, const cv::Mat& depth, const sensor::Pinhole& camera,
                             const geometry::Rigid3& depth_from_camera);
-/// The same for lines; dearer, and only keyframes need it.
+/// The same for lines; it takes longer, and only keyframes need it.
 void undo_line_depth_delay(FrameFeatures& features, const cv::Mat& depth, const sensor::Pinhole& camera,
                            const geometry::Rigid3& depth_from_camera, const LineDepthOptions& options = {});
 

@@ -42,7 +42,7 @@ struct FrameFeatures {
   std::vector<cv::Mat> levels;  ///< CV_8UC1, the image in each octave; empty once the frame is tracked
   std::shared_ptr<const PhotometricImage> photometric;  ///< for direct alignment; null once it is tracked
   /// Slant of the surface at each point: change of the inverse depth per pixel (1/m). No elements if not
-  /// known; keyframes give theirs up once all of their corners lie where they belong.
+  /// known; keyframes drop them once all of their corners are aligned.
   std::vector<Eigen::Vector2f> slants;
   PointGrid grid;
   std::vector<LineFeature> lines;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A 3D line from the depth under an image segment (docs/method/features.md: wrong lines go before they are
-// used).
+// A 3D line from the depth under an image segment (docs/method/features.md: wrong lines are removed before
+// they are used).
 #include <Eigen/Core>
 #include <cstdint>
 #include <opencv2/core/mat.hpp>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Conversion between measurements and features. A measurement is a pixel of the picture as the lens showed
+// Conversion between measurements and features. A measurement is a pixel of the image as the lens projected
 // it, in the row in which the shutter read it, with the depth as the depth camera gave it. A feature is made
-// from it for a rectified image that was taken all at once. With this conversion features
-// can be updated when the camera is calibrated again.
+// from it for a rectified image that was taken all at once. With this conversion features can be updated when
+// the camera is calibrated again.
 #include <Eigen/Core>
 #include <vector>
 

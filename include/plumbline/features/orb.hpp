@@ -24,7 +24,7 @@ struct PointFeature {
 
 struct OrbOptions {
   int count = 1000;
-  double scale_factor = 1.2;  ///< no option: whatever weighs corners by their octave counts on it
+  double scale_factor = 1.2;  ///< not an option: weights of corners depend on it
   int levels = 8;
   int fast_threshold = 20;
   int fast_threshold_min = 7;

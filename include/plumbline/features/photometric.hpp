@@ -34,8 +34,8 @@ struct PhotometricSample {
 using PhotometricSamples = std::array<std::vector<PhotometricSample>, kPhotometricLevels>;
 
 /// Samples of a level's image: of each cell the pixel with the steepest gradient, where depth is continuous.
-/// `depth`: CV_32FC1, metres, 0 = none, of the image's size, registered to it; `camera_from_depth` carries
-/// the depth camera to where the image was taken (they are stamped apart).
+/// `depth`: CV_32FC1, metres, 0 = none, of the image's size, registered to it; `camera_from_depth`: pose of
+/// the depth camera in the camera, as their stamps differ.
 PhotometricSamples sample_photometric(const PhotometricImage& image, const cv::Mat& depth,
                                       const sensor::Pinhole& camera,
                                       const geometry::Rigid3& camera_from_depth);

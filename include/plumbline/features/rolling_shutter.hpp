@@ -13,7 +13,7 @@ namespace plumbline::features {
 /// image of `height` rows is read, the share is v / height - 0.5 of the readout after the middle row.
 class RowMotion {
  public:
-  /// `shutter_motion`: FrameFeatures::shutter_motion. Of what has no depth only the turn is known.
+  /// `shutter_motion`: FrameFeatures::shutter_motion. Without depth only the rotation is applied.
   RowMotion(const geometry::Vector6d& shutter_motion, double share, bool has_depth);
   /// The moved point. A point that would come nearer than 5 cm, or behind the camera, is not moved.
   Eigen::Vector3d operator()(const Eigen::Vector3d& p) const;
@@ -25,7 +25,7 @@ class RowMotion {
 /// Moves points and lines (and their 3D ends) to where an image taken all at once, when the middle row was
 /// read, would show them. `velocity`: (m/s, rad/s) in the camera frame, camera_from_world(t + dt) =
 /// Exp(velocity dt) camera_from_world(t). `readout_s`: from the first row to the last; 0 changes nothing.
-/// `camera` is that of the features. What has no depth is turned only.
+/// `camera` is that of the features. Features without depth are only rotated.
 void undo_rolling_shutter(FrameFeatures& features, const sensor::Pinhole& camera,
                           const geometry::Vector6d& velocity, double readout_s);
 

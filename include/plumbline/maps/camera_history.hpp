@@ -14,8 +14,8 @@
 
 namespace plumbline::maps {
 
-/// A piece of surface as it was measured with the one camera, as the other one measured it. `velocity` (m/s,
-/// rad/s): of camera_from_world when it was taken, in its own frame.
+/// Converts a surface sample from the camera before the change to the one after it. `velocity` (m/s, rad/s):
+/// of camera_from_world when it was measured, in its own frame.
 void recalibrate(const sensor::Recalibration& change, const geometry::Vector6d& velocity,
                  SurfaceSample& sample);
 

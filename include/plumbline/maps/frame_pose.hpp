@@ -17,11 +17,11 @@ class Map;
 
 using FrameId = core::Id<struct FrameTag>;  ///< a robot's frame: its place among the robot's FramePoses
 
-/// A landmark in the picture of a frame (features::PixelDepth): the raw measurement, independent of the
+/// A landmark in the image of a frame (features::PixelDepth): the raw measurement, independent of the
 /// assumed camera.
 struct SeenPoint {
   core::PointId point;
-  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  ///< of the picture, as the lens showed it
+  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  ///< of the image before rectification
   float depth = 0.0F;                               ///< metres, as the depth camera gave it; 0: none
   float sigma_px = 1.0F;
 };

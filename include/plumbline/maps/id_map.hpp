@@ -76,6 +76,7 @@ class IdMap {
     }
     touch(id);
   }
+  /// Frees the element; its page counts as changed.
   void erase(IdType id) {
     const std::int32_t entry = entry_of(id);
     if (entry < 0) return;
@@ -84,6 +85,7 @@ class IdMap {
     touch(id);
     slots_[id.robot][static_cast<std::size_t>(id.index)] = kNone;
   }
+  /// All ids in order of robot and index.
   [[nodiscard]] std::vector<IdType> ids() const {
     std::vector<IdType> result;
     result.reserve(size());

@@ -9,8 +9,8 @@
 
 namespace plumbline::maps {
 
-/// True if `file` is there and `map`, `fuse` or `hub` wrote it as a part of a result. Files of other names
-/// that users keep in a result's folder are none.
+/// True if `file` exists and `map`, `fuse` or `hub` wrote it as a part of a result. Files of other names that
+/// users keep in a result's folder are not parts of it.
 bool is_part_of_result(const std::filesystem::path& file);
 
 /// Errors (kUsage): `output` is one of the `inputs`, or a part of a result or of a recording.

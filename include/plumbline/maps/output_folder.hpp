@@ -55,9 +55,9 @@ class OutputFolder {
   [[nodiscard]] const std::filesystem::path& path() const { return partial_; }  ///< folder to write to
   /// Announces files that this run will write besides those of FolderKind.
   core::Result<void> expect(const core::FileNames& files);
-  /// `error`, unless it comes from OUT.partial being gone: then that is told (kOutput).
+  /// `error`, unless it comes from OUT.partial being gone: then that is reported (kOutput).
   [[nodiscard]] core::Error explained(const core::Error& error) const;
-  /// Asks again whether OUT may be replaced. After an error (kOutput) OUT.partial stays.
+  /// Checks again whether OUT may be replaced. After an error (kOutput) OUT.partial stays.
   core::Result<void> commit();
   /// Keeps the files if this object ends without commit(), for another run to continue.
   void keep() { kept_ = true; }

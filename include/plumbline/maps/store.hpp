@@ -150,11 +150,10 @@ enum class StoreUse {
 /// call, and may be tried again.
 class StoreWriter {
  public:
-  /// Makes a new file. Errors (kOutput): it is there already, its folder is not there, disk full.
+  /// Makes a new file. Errors (kOutput): it exists already, its folder does not exist, disk full.
   static core::Result<StoreWriter> create(const std::filesystem::path& file, const StoreHeader& header,
                                           StoreUse use = StoreUse::kGrowing);
-  /// Continues the file of an earlier run and converts it to the present format. Errors (kInput) as
-  /// StoreReader::open; (kOutput): it is in use.
+  /// Continues the file of an earlier run. Errors (kInput) as StoreReader::open; (kOutput): it is in use.
   static core::Result<StoreWriter> resume(const std::filesystem::path& file);
   StoreWriter(StoreWriter&& other) noexcept;
   StoreWriter& operator=(StoreWriter&&) = delete;
@@ -192,7 +191,7 @@ class StoreWriter {
 /// may be read from several threads at a time; several readers may read one file.
 class StoreReader {
  public:
-  /// Errors (kInput): not there, no map store, damaged, written in a newer format.
+  /// Errors (kInput): it does not exist, is not a map store, is damaged or of another format.
   static core::Result<StoreReader> open(const std::filesystem::path& file);
   StoreReader(StoreReader&& other) noexcept;
   StoreReader& operator=(StoreReader&&) = delete;
@@ -209,7 +208,7 @@ class StoreReader {
   [[nodiscard]] core::Result<std::vector<StoredMap>> load_each() const;
   /// Errors (kInput): damaged.
   [[nodiscard]] core::Result<StoreContents> contents() const;
-  /// Keyframes that have a cloud, by id; also such as left the map.
+  /// Keyframes that have a cloud, by id; also those that left the map.
   [[nodiscard]] core::Result<std::vector<KeyframeId>> cloud_ids() const;
   /// A keyframe's cloud, in its camera frame. Errors (kInput): it has none, damaged.
   [[nodiscard]] core::Result<cloud::CloudPtr> cloud(KeyframeId keyframe) const;
@@ -225,7 +224,7 @@ class StoreReader {
   [[nodiscard]] core::Result<std::vector<std::uint8_t>> small_picture(KeyframeId keyframe) const;
   /// The whole picture, a JPEG file, rectified to RobotInfo::camera; empty: none was kept.
   [[nodiscard]] core::Result<std::vector<std::uint8_t>> whole_picture(KeyframeId keyframe) const;
-  /// Keyframes whose whole picture was kept, by id; also such as left the map.
+  /// Keyframes whose whole picture was kept, by id; also those that left the map.
   [[nodiscard]] core::Result<std::vector<KeyframeId>> whole_picture_ids() const;
   /// Empty if nothing has this name. Errors (kInput): damaged.
   [[nodiscard]] core::Result<std::optional<std::vector<std::uint8_t>>> attachment(

@@ -102,7 +102,7 @@ struct BundleSummary {
   int iterations = 0;
   int point_outliers = 0;
   int line_outliers = 0;
-  BundleFits before;    ///< the first round; all zero unless first_gate made it necessary to look
+  BundleFits before;    ///< the first round; all zero without first_gate
   BundleFits after;     ///< the last round
   bool usable = false;  ///< poses, points and lines were updated
   std::string message;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Bundle adjustment with the camera among the unknowns: poses, points, and the parameters that all pictures
+// Bundle adjustment with the camera among the unknowns: poses, points, and the parameters that all images
 // share (Zhang, PAMI 22, 2000; readout as in Hedborg, Forssen, Felsberg, Ringaby, CVPR 2012). Poses and
 // points are eliminated: the result is a quadratic function of the camera, from which any trial follows at
 // once. Plain structs in and out; Ceres inside. Deterministic: one thread, fixed order.
@@ -108,7 +108,7 @@ sensor::Camera changed_camera(const sensor::Camera& given, const CameraChange& c
 CameraChange change_between(const sensor::Camera& given, const sensor::Camera& camera);
 
 /// The evidence of a problem around the camera that `change` makes of the given one, poses (those that are
-/// not fixed) and points being adjusted to that: the problem has them afterwards, so that the next question
+/// not fixed) and points being adjusted to that: the problem has them afterwards, so that the next call
 /// begins there. None: it could not be solved.
 std::optional<CameraEvidence> camera_evidence(CalibrationProblem& problem, const CameraChange& change);
 

@@ -13,8 +13,8 @@
 
 namespace plumbline::optimize {
 
-/// A surface sample and its grey value in the reference camera's image. The derivative and the value lie side
-/// by side: sum_photometric() takes them as one row.
+/// A surface sample and its grey value in the reference camera's image. The derivative and the value are
+/// adjacent in memory: sum_photometric() takes them as one row.
 struct PhotometricTerm {
   /// Derivative of the expected grey value by xi = (rho, phi), camera_from_reference <- camera_from_reference
   /// Exp(xi).

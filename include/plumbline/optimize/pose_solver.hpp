@@ -40,10 +40,10 @@ struct PoseSolverOptions {
   double plane_loss = 1.0;
   double point_weight = 1.0;  ///< of the whole family: its terms are not quite independent
   double line_weight = 1.0;
-  bool depth_rows = true;      ///< points are held by their depth, too
+  bool depth_rows = true;      ///< the depth of points constrains the pose as well
   double plane_weight = 0.08;  ///< depth noise is correlated between neighbouring pixels
   double photometric_loss = 1.5;
-  double photometric_weight = 0.04;  ///< grey values of neighbouring pixels are all but the same
+  double photometric_weight = 0.04;  ///< grey values of neighbouring pixels are strongly correlated
   double min_step = 1e-6;            ///< metres and radians: a smaller step ends the iteration
 
   void declare(core::OptionTable& table);

@@ -17,7 +17,7 @@ struct RecogniserOptions {
   double min_score = 0.25;  ///< eta, relative to the neighbour's score
   double min_absolute = 0.015;
   int consistent = 3;  ///< keyframes in a row that must see the same surroundings
-  int hits = 30;       ///< best keyframes that are looked at
+  int hits = 30;       ///< best keyframes that are considered
   bool votes = false;  ///< candidates share most words (section 4.2) instead of having the best scores
   int groups = 3;      ///< candidates at most
   void declare(core::OptionTable& table);
@@ -39,9 +39,9 @@ class Recogniser {
  public:
   explicit Recogniser(const RecogniserOptions& options) : options_(options) {}
 
-  /// Candidates for keyframe `query` from what `Database::query` said of its image: best group first.
-  /// `neighbour` is a keyframe that saw nearly the same as the query (usually the one before): its score is
-  /// what a good score is here; invalid: scores are not compared. Keyframes that `allowed` refuses (the
+  /// Candidates for keyframe `query` from the scores of its image (`Database::query`): best group first.
+  /// `neighbour` is a keyframe that saw nearly the same as the query (usually the one before): other scores
+  /// are relative to its score; invalid: scores are not compared. Keyframes that `allowed` refuses (the
   /// query's own surroundings) are left out. Those seen fewer than options.consistent times in a row come
   /// too, with their in_a_row.
   std::vector<Candidate> recognise(const Database::Scores& scores, core::KeyframeId query,

@@ -68,7 +68,7 @@ class Vocabulary {
   [[nodiscard]] std::int64_t patience(int level) const;
 
   VocabularyOptions options_;
-  std::vector<Node> nodes_;  ///< 0 and 1 are the roots; children of a node lie side by side
+  std::vector<Node> nodes_;  ///< 0 and 1 are the roots; children of a node are consecutive
   std::vector<features::Descriptor256> centres_;  ///< centre of each node
 };
 

@@ -42,7 +42,7 @@ struct Pinhole {
   }
 };
 
-/// Standard deviations that a camera file tells of its own numbers; 0: not told.
+/// Standard deviations of a camera's numbers, as its file states them; 0: not stated.
 struct CameraSigma {
   double fx = 0.0;             ///< px, of fx; fy's is in proportion
   double centre = 0.0;         ///< px, of cx and of cy

@@ -32,7 +32,7 @@ core::Result<CameraReading> read_camera_file(const std::filesystem::path& file);
 core::Result<CameraReading> find_camera(const std::string& name_or_file,
                                         const std::filesystem::path& cameras_folder);
 
-/// True if the file looks like another program's camera file; a file of plain numbers, which could be
+/// True if the file has the form of another program's camera file; a file of plain numbers, which could be
 /// anything, only counts with `numbers_too`. False if it cannot be read.
 bool is_foreign_camera_file(const std::filesystem::path& file, bool numbers_too);
 

@@ -10,12 +10,12 @@
 
 namespace plumbline::sensor {
 
-/// One camera and the pinhole of the images that are made of its pictures.
+/// One camera and the pinhole to which its images are rectified.
 class ImageModel {
  public:
   ImageModel(const Pinhole& image, const Camera& camera) : image_(image), camera_(camera) {}
 
-  /// Pixel of the picture as the lens shows it, distortion and all, of a rectified pixel.
+  /// Pixel of the distorted image from which a rectified pixel is taken.
   [[nodiscard]] Eigen::Vector2d lens_pixel(const Eigen::Vector2d& rectified) const;
   /// The inverse; Newton's method, exact to 1e-6 px inside the image.
   [[nodiscard]] Eigen::Vector2d rectified_pixel(const Eigen::Vector2d& lens) const;

@@ -27,6 +27,13 @@ struct WriteSummary {
   double wall_s = 0.0;            ///< of rendering and writing the frames
 };
 
+/// A world to be filmed. Scene and options must outlive this.
+struct WriteRequest {
+  const Scene& scene;
+  const SynthOptions& options;
+  std::filesystem::path output;  ///< folder
+};
+
 /// Frames written so far, frames in all.
 using Progress = std::function<void(std::size_t, std::size_t)>;
 
@@ -47,9 +54,8 @@ using Progress = std::function<void(std::size_t, std::size_t)>;
 ///   counts
 /// Errors: kUsage (options, scene), kOutput (cannot write; names the file). `progress` may be empty; it is
 /// called from one thread at a time.
-core::Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& options,
-                                            const std::filesystem::path& output,
-                                            const core::Executor& executor, const core::StopToken& stop,
-                                            core::Log& log, const Progress& progress);
+core::Result<WriteSummary> write_recordings(const WriteRequest& request, const core::Executor& executor,
+                                            const core::StopToken& stop, core::Log& log,
+                                            const Progress& progress);
 
 }  // namespace plumbline::synth

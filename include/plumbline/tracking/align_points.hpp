@@ -16,14 +16,19 @@ void align_points(const maps::Map& map, const features::FrameFeatures& frame, co
                   const geometry::Rigid3& camera_from_world, double scale_factor,
                   std::vector<PointMatch>& matches);
 
-/// Position in an image (`levels`, of `camera_from_world`) of the corner that a keyframe saw of what lies at
+/// An image pyramid, and a guess of its pose. What it refers to must outlive it.
+struct PosedImage {
+  const std::vector<cv::Mat>& levels;
+  const sensor::Pinhole& camera;
+  const geometry::Rigid3& camera_from_world;
+  double scale_factor;  ///< of the ORB pyramid
+};
+
+/// Position in an image of the corner that a keyframe saw of what lies at
 /// `position`, pixels of the full image; `start`: expected position, to two pixels of the corner's octave.
 /// None if the keyframe saw it too differently, or the images do not agree.
 std::optional<Eigen::Vector2f> align_observation(const maps::Map& map, const maps::Observation& seen,
-                                                 const Eigen::Vector3d& position,
-                                                 const std::vector<cv::Mat>& levels,
-                                                 const Eigen::Vector2f& start, const sensor::Pinhole& camera,
-                                                 const geometry::Rigid3& camera_from_world,
-                                                 double scale_factor);
+                                                 const Eigen::Vector3d& position, const PosedImage& image,
+                                                 const Eigen::Vector2f& start);
 
 }  // namespace plumbline::tracking

@@ -42,19 +42,24 @@ struct AssociationOptions {
   void declare(core::OptionTable& table);
 };
 
+/// Features of a frame, and a guess of its pose. What it refers to must outlive it.
+struct PosedFrame {
+  const features::FrameFeatures& features;
+  const sensor::Pinhole& camera;
+  const geometry::Rigid3& camera_from_world;
+};
+
 /// Matches point landmarks by projection: within `radius` pixels (grown with the octave), of a fitting
 /// octave, seen from a fitting side, best and clearly better than the second best, each feature used once.
 /// `visible` receives the landmarks inside the view.
 std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<core::PointId>& points,
-                                     const features::FrameFeatures& frame, const sensor::Pinhole& camera,
-                                     const geometry::Rigid3& camera_from_world, double radius,
+                                     const PosedFrame& posed, double radius,
                                      const AssociationOptions& options, std::vector<core::PointId>* visible);
 
 /// Matches line landmarks by projection: near in distance and angle, overlapping, and alike in descriptor.
 std::vector<LineMatch> match_lines(const maps::Map& map, const std::vector<core::LineId>& lines,
-                                   const features::FrameFeatures& frame, const sensor::Pinhole& camera,
-                                   const geometry::Rigid3& camera_from_world, double radius,
-                                   const AssociationOptions& options, std::vector<core::LineId>* visible);
+                                   const PosedFrame& posed, double radius, const AssociationOptions& options,
+                                   std::vector<core::LineId>* visible);
 
 struct SurfaceAssociationOptions {
   double max_distance_m = 0.10;  ///< measured point from the tangent plane
@@ -62,15 +67,20 @@ struct SurfaceAssociationOptions {
   double max_depth_m = 6.0;
 };
 
-/// Projective association of surface samples with `depth` (CV_32FC1, metres): the sample is projected, and
-/// the depth measured there is the point that should lie on its tangent plane. `depth_from_camera` transforms
-/// from the camera of the colour image to that of the depth image (they have different stamps); the measured
-/// points are returned in the colour camera's frame. `in_view` receives the number of samples that face the
+/// A depth image, and a guess of the pose of the colour image's camera. What it refers to must outlive it.
+struct PosedDepth {
+  const cv::Mat& depth;  ///< CV_32FC1, metres
+  const sensor::Pinhole& camera;
+  const geometry::Rigid3& camera_from_world;
+  const geometry::Rigid3& depth_from_camera;  ///< the images have different stamps
+};
+
+/// Projective association of surface samples with a depth image: the sample is projected, and the depth
+/// measured there is the point that should lie on its tangent plane. The measured points are returned in the
+/// colour camera's frame. `in_view` receives the number of samples that face the
 /// camera and have a measured depth where they should be seen, whether it fits or not.
 std::vector<optimize::PlaneTerm> associate_surface(const std::vector<WorldSurface>& surface,
-                                                   const cv::Mat& depth, const sensor::Pinhole& camera,
-                                                   const geometry::Rigid3& camera_from_world,
-                                                   const geometry::Rigid3& depth_from_camera,
+                                                   const PosedDepth& posed,
                                                    const SurfaceAssociationOptions& options,
                                                    int* in_view = nullptr);
 

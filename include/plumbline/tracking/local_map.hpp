@@ -32,7 +32,7 @@ struct LocalMap {
   std::vector<WorldSurface> surface;  ///< interleaved, so that any prefix is spread over all keyframes
 };
 
-/// Keyframes that share landmarks with `reference`, filled up with the latest ones that look the same way
+/// Keyframes that share landmarks with `reference`, filled up with the latest ones that face the same way
 /// (without texture, nothing else shows that they overlap); their landmarks and surfaces.
 LocalMap build_local_map(const maps::Map& map, core::KeyframeId reference, const LocalMapOptions& options);
 

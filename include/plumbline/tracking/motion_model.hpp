@@ -13,7 +13,7 @@ namespace plumbline::tracking {
 
 struct TrackResult;
 
-/// Motion as sensors of the body tell it, between two moments; none: not known.
+/// Motion between two moments, measured by sensors of the body; none: not known.
 struct SensedMotion {
   std::optional<geometry::Rigid3> moved;     ///< camera later from camera earlier, by wheels
   std::optional<Eigen::Matrix3d> turned;     ///< its rotation, by a gyroscope
@@ -26,7 +26,7 @@ class MotionModel {
   /// Sets the recorder's odometry for the frame that is tracked next, world_from_camera in a world of its
   /// own; none: it has no pose.
   void set_odometry(const std::optional<geometry::Rigid3>& pose) { odometry_ = pose; }
-  /// Sets what sensors say of the motion from the last tracked frame to the one that is tracked next.
+  /// Sets the motion that sensors measured from the last tracked frame to the one that is tracked next.
   void set_sensed(SensedMotion sensed) { sensed_ = std::move(sensed); }
   /// camera_from_world at a time: by odometry, from the last tracked frame on, or else by velocity, at most
   /// 0.2 s after the last pose.
@@ -43,9 +43,9 @@ class MotionModel {
   void update(double stamp, const TrackResult& result);
   /// Updates the model with a lost frame.
   void lost();
-  /// Takes back all poses found after the first `frames` lost ones.
+  /// Discards all poses found after the first `frames` lost ones.
   void lost_since(int frames) { lost_frames_ = frames; }
-  /// Forgets the past, because the camera was found elsewhere.
+  /// Resets the model, because the camera was found elsewhere.
   void reset();
   /// Continues from a keyframe, with this velocity of camera_from_world per second.
   void restore(double stamp, const geometry::Vector6d& velocity);
@@ -62,7 +62,7 @@ class MotionModel {
   [[nodiscard]] bool outdated() const {
     return lost_frames_ >= (knows_odometry() || knows_wheels() ? 60 : 5);
   }
-  /// True after some more time without a pose: the last one is of no use.
+  /// True after some more time without a pose: the last one is not used any more.
   [[nodiscard]] bool expired() const {
     return lost_frames_ >= (knows_odometry() || knows_wheels() ? 300 : 30);
   }
@@ -76,7 +76,7 @@ class MotionModel {
   }
   /// True if odometry gives the motion from the last tracked frame to the present one.
   [[nodiscard]] bool knows_odometry() const { return valid_ && odometry_ && last_odometry_; }
-  /// True if wheels give the motion from the last tracked frame to the present one, but for slip.
+  /// True if wheels give the motion from the last tracked frame to the present one, except for slip.
   [[nodiscard]] bool knows_wheels() const { return valid_ && sensed_.moved; }
   /// True if a gyroscope gives its rotation.
   [[nodiscard]] bool knows_turn() const { return valid_ && sensed_.turned; }
@@ -106,7 +106,7 @@ class MotionModel {
   int steps_ = 0;        ///< number of consecutive steps from which the velocity was estimated
   double step_s_ = 0.0;  ///< duration of the last step
   int lost_frames_ = 0;
-  double dead_reckoning_s_ = 0.0;  ///< time for which it has held unmeasured directions
+  double dead_reckoning_s_ = 0.0;  ///< time for which it has constrained unmeasured directions
   bool contradicted_ = false;
   SensedMotion sensed_;                            ///< from the last tracked frame to the present one
   std::optional<geometry::Rigid3> odometry_;       ///< of the present frame

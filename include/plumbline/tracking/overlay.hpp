@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Drawing of the tracker's results onto the image: for eyes, not for estimation.
+// Drawing of the tracker's results onto the image: for people, not for estimation.
 #include <opencv2/core/mat.hpp>
 
 #include "plumbline/features/frame_features.hpp"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Direct alignment with keyframes: selects the samples of theirs that a camera sees, and tests whether they
-// look the same.
+// Direct alignment with keyframes: selects those of their samples that a camera sees, and tests whether
+// intensities agree.
 #include <memory>
 #include <optional>
 #include <utility>
@@ -35,14 +35,14 @@ std::optional<optimize::PhotometricFamily> associate_photometric(const features:
                                                                  const geometry::Rigid3& camera_from_world);
 constexpr int kMinPhotometric = 500;
 
-/// Samples of the keyframes that were made last; those of older ones are forgotten, so that memory does not
-/// grow with the map.
+/// Samples of the keyframes that were made last; those of older ones are erased, so that memory does not grow
+/// with the map.
 class PhotometricKeyframes {
  public:
   void add(core::KeyframeId id, std::shared_ptr<const features::PhotometricSamples> samples);
-  /// Samples lie where another camera saw them.
+  /// Moves the samples to their positions for another camera.
   void recalibrate(const sensor::Recalibration& change);
-  /// Null: not known, or forgotten.
+  /// Null: not known, or erased.
   [[nodiscard]] std::shared_ptr<const features::PhotometricSamples> find(core::KeyframeId id) const;
   /// associate_photometric() with the first of `keyframes` that has enough in view.
   [[nodiscard]] std::optional<optimize::PhotometricFamily> associate(

@@ -15,7 +15,7 @@
 namespace plumbline::tracking {
 
 struct Relocalisation {
-  core::KeyframeId keyframe;  ///< keyframe that the frame looks like
+  core::KeyframeId keyframe;  ///< most similar keyframe
   geometry::Rigid3 camera_from_world;
   int inliers = 0;
 };
@@ -27,20 +27,20 @@ std::optional<Relocalisation> relocalise(const maps::Map& map,
                                          const features::FrameFeatures& features,
                                          const sensor::Pinhole& camera, int min_inliers);
 
-/// A keyframe and how much the image as a whole looks like it: normalised correlation of the thumbnails,
-/// best over shifts of up to a fifth of the image (compare Klein & Murray, ECCV 2008).
+/// A keyframe and its similarity to the whole image: normalised correlation of the thumbnails, best over
+/// shifts of up to a fifth of the image (compare Klein & Murray, ECCV 2008).
 struct LookAlike {
   core::KeyframeId keyframe;
   double correlation = 0.0;
 };
 
-/// Up to `count` of `candidates` that look like the image, most alike first. None for an image
-/// without contrast.
+/// Up to `count` of `candidates` that are similar to the image, most similar first. None for an image without
+/// contrast.
 std::vector<LookAlike> look_alikes(const maps::Map& map, const std::vector<core::KeyframeId>& candidates,
                                    const features::FrameFeatures& features, int count);
 
-/// Pose from aligning the thumbnail with a keyframe's. Places can look alike: a guess that landmarks and
-/// surfaces must confirm.
+/// Pose from aligning the thumbnail with a keyframe's. Thumbnails of different places can be similar:
+/// landmarks and surfaces must confirm the pose.
 geometry::Rigid3 align_look_alike(const maps::Map& map, core::KeyframeId keyframe,
                                   const features::FrameFeatures& features, const sensor::Pinhole& camera);
 

@@ -21,8 +21,8 @@ struct SurfaceSamplerOptions {
 
 /// Samples of `depth` (CV_32FC1, metres, 0 = none), half of them spread evenly over the image, half evenly
 /// over the directions of the normals (normal-space sampling, Rusinkiewicz & Levoy 2001), so that all six
-/// degrees of freedom are held wherever the scene allows. Normals have the wide base that structured-light
-/// depth needs. Deterministic.
+/// degrees of freedom are constrained wherever the scene allows. Normals have the wide base that
+/// structured-light depth needs. Deterministic.
 std::vector<maps::SurfaceSample> sample_surface(const cv::Mat& depth, const sensor::Pinhole& camera,
                                                 const SurfaceSamplerOptions& options);
 

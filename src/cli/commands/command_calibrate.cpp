@@ -43,15 +43,16 @@ mapping::SlamOptions slam_options() {
 class Mapped {
  public:
   core::Result<void> add(const std::string& input, const CalibrateRequest& request, Session& session) {
+    // The recording with its calibration
     const auto pipelines = session.pipelines_folder();
     if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
-
     dataset::OpenOptions open = request.open;
     open.cameras_folder = *pipelines / "cameras";
     Console& console = session.console();
     auto source = pipeline::open_input(input, open, *pipelines / "scenes", session.executor(), console);
     if (!source) return tl::unexpected<core::Error>(source.error());
 
+    // One camera is adjusted over all recordings
     const sensor::Camera& camera = (*source)->camera();
     if (runs_.empty()) {
       camera_ = camera;
@@ -62,6 +63,7 @@ class Mapped {
           input));
     }
 
+    // Each recording is tracked by itself
     runs_.push_back(
         std::make_unique<mapping::Slam>(slam_options(), camera.color, 0, session.executor(), console));
     runs_.back()->set_camera(camera);
@@ -85,13 +87,17 @@ class Mapped {
   }
 
   void track(const dataset::FrameSource& source, Session& session) {
+    // Features are extracted in parallel, tracking is sequential
     struct Read {
       std::shared_ptr<const sensor::RgbdFrame> frame;
       std::shared_ptr<const features::FrameFeatures> features;
     };
 
+    // A bounded number of frames in memory
     const features::FeatureExtractor extractor({}, source.camera().color);
     constexpr std::size_t kChunk = 16;  // frames in memory
+
+    // A frame that cannot be read is left out
     for (std::size_t begin = 0; begin < source.size(); begin += kChunk) {
       std::vector<Read> chunk(std::min(kChunk, source.size() - begin));
       session.executor().parallel_for(chunk.size(), [&](std::size_t i) {
@@ -101,13 +107,12 @@ class Mapped {
         chunk[i].frame = std::make_shared<sensor::RgbdFrame>(std::move(*frame));
       });
 
+      // Tracking in the order of the frames
       for (const Read& read : chunk) {
         if (read.frame != nullptr) runs_.back()->process(*read.frame, read.features);
       }
-
       session.console().progress(begin + chunk.size(), source.size(), "frames");
     }
-
     session.console().end_progress();
     runs_.back()->finish();
   }
@@ -116,6 +121,7 @@ class Mapped {
   std::vector<std::unique_ptr<mapping::Slam>> runs_;
 };
 
+/// Given and found values, with their standard deviations.
 void print_calibration(const mapping::CameraCalibration& calibration) {
   print("{} views, {} observations of points\n", calibration.views, calibration.observations);
   print("{:<14} {:>10} {:>10} {:>9} {:>7}\n", "", "given", "found", "+-", "wrong");
@@ -147,23 +153,28 @@ core::Result<void> check_camera_output(const CalibrateRequest& request) {
 }
 
 core::Result<void> calibrate(const CalibrateRequest& request, Session& session) {
+  // The output is checked before the long work
   if (!request.output.empty()) {
     if (auto fit = check_camera_output(request); !fit) return fit;
   }
 
+  // Keyframes of all recordings
   Mapped mapped;
   for (const std::string& input : request.inputs) {
     if (auto added = mapped.add(input, request, session); !added) return added;
   }
 
+  // Bundle adjustment with the camera's parameters
   const auto calibration =
       mapping::calibrate_camera(mapped.runs(), mapped.camera(), request.options, session.executor());
   if (!calibration) return tl::unexpected<core::Error>(calibration.error());
   if (!session.quiet) print_calibration(*calibration);
 
+  // A file that fits is not replaced
   const bool fits = calibration->news < mapping::kFileIsWrong;
   if (fits && !session.quiet) print("the given camera fits; nothing better was found\n");
 
+  // The file keeps the standard deviations
   if (request.output.empty()) return {};
   sensor::Camera camera = fits ? mapped.camera() : calibration->camera;
   camera.sigma = calibration->sigma;
@@ -175,6 +186,7 @@ core::Result<void> calibrate(const CalibrateRequest& request, Session& session) 
 
 }  // namespace
 
+/// Options of calibrate.
 void add_calibrate(CLI::App& app, Session& session) {
   const auto request = std::make_shared<CalibrateRequest>();
   CLI::App* command =

@@ -36,13 +36,15 @@ struct CheckRequest {
   dataset::OpenOptions open;
 };
 
-/// RMS of the standard deviations that a result tells of its keyframes' positions; 0: it tells none.
+/// RMS of the standard deviations of keyframes' positions that a result states; 0: it states none.
 double told_by(const fs::path& result) {
+  // The table may lack the column
   std::ifstream table(result / "keyframes.csv");
   std::size_t column = std::string::npos;
   double sum = 0.0;
   std::size_t count = 0;
 
+  // The header names the columns
   for (std::string line; std::getline(table, line);) {
     std::vector<std::string> cells;
     std::istringstream text(line);
@@ -53,6 +55,7 @@ double told_by(const fs::path& result) {
       continue;
     }
 
+    // Rows without a value do not count
     const auto sigma = column < cells.size() ? core::to_number(cells[column]) : std::nullopt;
     if (!sigma || !std::isfinite(*sigma)) continue;
     sum += *sigma * *sigma;
@@ -78,9 +81,10 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_for_check(const CheckRe
                               session.console());
 }
 
-/// Small pictures of the frames that the check needs, and which these are.
+/// The frames that the check needs, scaled down, and their numbers in `input`.
 check::FrameStore keep_frames(const dataset::FrameSource& source, const CheckRequest& request,
                               Session& session, check::CheckInput& input) {
+  // Frames that the check may use
   struct Wanted {
     std::size_t index;
     check::FrameChoice::Use use;
@@ -96,7 +100,7 @@ check::FrameStore keep_frames(const dataset::FrameSource& source, const CheckReq
     if (use != check::FrameChoice::Use::kNone) wanted.push_back({i, use});
   }
 
-  // A few are decoded side by side, and shrunk at once.
+  // A few are decoded in parallel and scaled down at once.
   check::FrameStore store(fs::temp_directory_path());
   constexpr std::size_t kChunk = 16;  // frames in memory
   for (std::size_t begin = 0; begin < wanted.size(); begin += kChunk) {
@@ -106,6 +110,7 @@ check::FrameStore keep_frames(const dataset::FrameSource& source, const CheckReq
       if (frame) chunk[k] = check::shrink(*frame, source.camera().color);
     });
 
+    // Small frames go to a file
     for (std::size_t k = 0; k < chunk.size(); ++k) {
       if (!chunk[k]) continue;  // the others will do
       input.frames.push_back(
@@ -120,17 +125,20 @@ check::FrameStore keep_frames(const dataset::FrameSource& source, const CheckReq
 }
 
 core::Result<check::CheckReport> check_recording(const CheckRequest& request, Session& session) {
+  // Path and recording
   auto path = dataset::read_trajectory(file_in(request.path, "trajectory.txt"));
   if (!path) return tl::unexpected<core::Error>(path.error());
   auto source = open_for_check(request, session);
   if (!source) return tl::unexpected<core::Error>(source.error());
 
+  // Camera and path as the check needs them
   check::CheckInput input;
   const sensor::Camera& camera = (*source)->camera();
   input.ways.push_back({camera.color, camera.readout_s.value_or(0.0), std::move(*path)});
   input.max_dt_s = request.max_dt_s;
   input.told_m = told_by(request.path);
 
+  // Frames that have a pose
   const check::FrameStore store = keep_frames(**source, request, session, input);
   if (input.frames.empty()) {
     return core::input_error(
@@ -139,6 +147,7 @@ core::Result<check::CheckReport> check_recording(const CheckRequest& request, Se
                     request.path.string(), request.max_dt_s, request.recording));
   }
 
+  // Frames are read on demand
   input.read = [&store](std::size_t number) { return store.read(number); };
   auto report = check::check_path(input, session.executor());
   if (!report || request.samples.empty()) return report;
@@ -152,6 +161,7 @@ core::Result<check::CheckReport> check_recording(const CheckRequest& request, Se
   return report;
 }
 
+/// Checks the outputs first; the exit code tells a bad path.
 int check_and_tell(const CheckRequest& request, Session& session) {
   for (const fs::path& file : {request.json, request.samples}) {
     if (file.empty()) continue;
@@ -173,6 +183,7 @@ int check_and_tell(const CheckRequest& request, Session& session) {
 }  // namespace
 
 void add_check(CLI::App& app, Session& session) {
+  // The path
   const auto request = std::make_shared<CheckRequest>();
   CLI::App* command =
       add_command(app, session, "check", "Judge a path against its recording, without the truth",
@@ -198,6 +209,7 @@ void add_check(CLI::App& app, Session& session) {
       ->type_name("S")
       ->check(CLI::Range(1e-6, 10.0));
 
+  // Outputs
   command->add_option("--json", request->json, "Also write the numbers into this file")->type_name("FILE");
   command
       ->add_option("--samples", request->samples,

@@ -16,6 +16,7 @@ struct CompareCommand {
   OptionFlags flags;
 };
 
+/// Compares and prints what has changed.
 core::Result<void> run_compare(CompareCommand& command, Session& session) {
   if (auto applied = command.flags.apply(); !applied) return applied;
   command.request.open = recording_opener(session);
@@ -31,11 +32,13 @@ core::Result<void> run_compare(CompareCommand& command, Session& session) {
 }  // namespace
 
 void add_compare(CLI::App& app, Session& session) {
+  // The two maps and the output
   const auto state = std::make_shared<CompareCommand>();
   CLI::App* command =
       add_command(app, session, "compare", "Tell what has changed between two maps of a place",
                   [&session, state] { return run_compare(*state, session); });
 
+  // Earlier map, later map and output
   changes::CompareRequest& request = state->request;
   command->add_option("BEFORE", request.before, "Earlier map: a result folder, map.db, or a cloud file")
       ->required();
@@ -44,6 +47,7 @@ void add_compare(CLI::App& app, Session& session) {
       ->required()
       ->type_name("DIFF");
 
+  // Stamps may be wrong
   const std::map<std::string, changes::Order> orders = {{"stamps", changes::Order::kStamps},
                                                         {"given", changes::Order::kGiven}};
   command
@@ -54,6 +58,7 @@ void add_compare(CLI::App& app, Session& session) {
       ->type_name("stamps|given")
       ->transform(one_of(orders));
 
+  // Points, progress and thresholds
   command
       ->add_option("--points", request.points,
                    "Largest number of points of each map, thinned by voxels; 0: all (default: 1500000)")

@@ -33,6 +33,7 @@ class ShippedNames : public NameSource {
     if (folder) folder_ = *folder;
   }
 
+  /// Names of shipped files and of registered types.
   [[nodiscard]] std::vector<Candidate> names(Kind kind) const override {
     switch (kind) {
       case Kind::kPipelines:
@@ -53,6 +54,7 @@ class ShippedNames : public NameSource {
     return {};
   }
 
+  /// Keys for --set, with their defaults.
   [[nodiscard]] std::vector<Candidate> keys(const std::string& pipeline) const override {
     std::vector<Candidate> keys;
     for (const pipeline::Node& node : load(pipeline).nodes) {
@@ -64,6 +66,7 @@ class ShippedNames : public NameSource {
     return keys;
   }
 
+  /// Values that an option may have, as far as they are known.
   [[nodiscard]] std::vector<std::string> values(const std::string& pipeline,
                                                 const std::string& key) const override {
     for (const pipeline::Node& node : load(pipeline).nodes) {
@@ -77,6 +80,7 @@ class ShippedNames : public NameSource {
     return {};
   }
 
+  /// Robots of the maps that the line names.
   [[nodiscard]] std::vector<std::string> robots(const std::vector<std::string>& maps) const override {
     std::vector<std::string> names;
     for (const std::string& map : maps) {
@@ -169,6 +173,7 @@ struct ManRequest {
   fs::path folder;
 };
 
+/// One page per command, and one for the program.
 core::Result<void> write_pages(const CommandReference& command, const CommandReference& program,
                                const fs::path& folder) {
   const fs::path file = folder / (command.name("-") + ".1");
@@ -179,6 +184,7 @@ core::Result<void> write_pages(const CommandReference& command, const CommandRef
   return {};
 }
 
+/// A page on standard output, or all pages in a folder.
 core::Result<void> man(const ManRequest& request, const CLI::App& app) {
   const CommandReference program = command_reference(app);
   if (!request.folder.empty()) {
@@ -196,6 +202,7 @@ core::Result<void> man(const ManRequest& request, const CLI::App& app) {
   return {};
 }
 
+/// Options of man.
 void add_man(CLI::App& app, Session& session) {
   const auto request = std::make_shared<ManRequest>();
   CLI::App* command = add_command(app, session, "man", "Print the manual page of a command, for man -l -",
@@ -206,6 +213,7 @@ void add_man(CLI::App& app, Session& session) {
       ->type_name("DIR");
 }
 
+/// The hidden command that the scripts call.
 void add_complete(CLI::App& app, Session& session) {
   const auto request = std::make_shared<CompleteRequest>();
   CLI::App* command = app.add_subcommand("complete", "Used by the scripts of `plumbline completion`");
@@ -221,6 +229,7 @@ void add_complete(CLI::App& app, Session& session) {
 }  // namespace
 
 void add_completion(CLI::App& app, Session& session) {
+  // The script is printed, not installed
   const auto shell = std::make_shared<std::string>();
   CLI::App* command = add_command(app, session, "completion",
                                   "Print a script with which a shell completes plumbline's commands",
@@ -231,6 +240,7 @@ void add_completion(CLI::App& app, Session& session) {
                                     return {};
                                   });
 
+  // Shell and instructions
   command->add_option("SHELL", *shell, "The shell")
       ->required()
       ->check(CLI::IsMember({"bash", "zsh", "fish"}));
@@ -240,6 +250,7 @@ void add_completion(CLI::App& app, Session& session) {
       "  zsh:  plumbline completion zsh > DIR/_plumbline   (DIR in $fpath, before compinit)\n"
       "  fish: plumbline completion fish > ~/.config/fish/completions/plumbline.fish");
 
+  // Commands that read the same reference
   add_man(app, session);
   add_complete(app, session);
 }

@@ -47,6 +47,7 @@ core::Result<void> check_places(const std::filesystem::path& input, const std::f
 }
 
 core::Result<void> convert(Session& session, ConvertRequest& request) {
+  // A copy never overwrites its source
   if (auto apart = check_places(request.input, request.output); !apart) return apart;
   const auto pipelines = session.pipelines_folder();
   if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
@@ -56,6 +57,7 @@ core::Result<void> convert(Session& session, ConvertRequest& request) {
       pipeline::open_input(request.input, request.open, *pipelines / "scenes", session.executor(), console);
   if (!source) return tl::unexpected<core::Error>(source.error());
 
+  // Ctrl-C ends the copy after a frame
   const core::StopToken stop = stop_on_signals();
   const auto show_progress = console.counting("frames");
   dataset::ConvertOptions options;
@@ -63,11 +65,12 @@ core::Result<void> convert(Session& session, ConvertRequest& request) {
   options.stop = [&stop] { return stop.stop_requested(); };
   options.progress = [&](std::size_t frames) { show_progress(frames, (*source)->size()); };
 
+  // Frames that cannot be read are left out
   const auto summary = dataset::convert_recording(**source, request.output, options, console);
-
   console.end_progress();
   if (!summary) return tl::unexpected<core::Error>(summary.error());
 
+  // The user learns what is missing
   if (summary->stopped) console.warning("stopped: the copy ends here");
   if (summary->unreadable > 0)
     console.warning(fmt::format("{} of {} frames cannot be copied and are left out", summary->unreadable,
@@ -78,6 +81,7 @@ core::Result<void> convert(Session& session, ConvertRequest& request) {
 
 }  // namespace
 
+/// Options of convert.
 void add_convert(CLI::App& app, Session& session) {
   const auto request = std::make_shared<ConvertRequest>();
   CLI::App* command =

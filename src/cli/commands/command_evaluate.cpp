@@ -53,6 +53,7 @@ std::vector<std::string> estimate_names(const std::vector<fs::path>& given) {
   return result;
 }
 
+/// Charts of every estimate against its truth.
 core::Result<void> write_plots(const std::vector<evaluate::NamedReport>& reports, const fs::path& folder) {
   std::vector<viz::TrajectoryComparison> comparisons;
   for (const evaluate::NamedReport& named : reports) {
@@ -99,18 +100,21 @@ std::size_t frames_of(const fs::path& result) {
 std::vector<evaluate::ComponentReport> measure_components(const fs::path& result,
                                                           const geometry::Trajectory& truth,
                                                           const evaluate::TrajectoryOptions& options) {
+  // The components' folders, by name
   std::error_code ignored;
   std::vector<fs::path> folders;
   for (const auto& entry : fs::directory_iterator(result / "components", ignored))
     folders.push_back(entry.path());
   std::sort(folders.begin(), folders.end());
 
+  // Each is aligned by itself
   const std::size_t frames = frames_of(result);
   std::vector<evaluate::ComponentReport> components;
   for (const fs::path& folder : folders) {
     const auto way = dataset::read_trajectory(folder / "trajectory.txt");
     if (!way) continue;
 
+    // Share of all frames, if they are counted
     evaluate::ComponentReport component;
     component.name = folder.filename().string();
     component.poses = way->size();
@@ -120,72 +124,78 @@ std::vector<evaluate::ComponentReport> measure_components(const fs::path& result
       component.ate_m = measured->ate_m;
     components.push_back(std::move(component));
   }
+
   return components;
 }
 
 core::Result<std::vector<evaluate::NamedReport>> measure_paths(const TrajectoryRequest& request,
                                                                Console& console) {
+  // The last file is the truth
   const std::vector<fs::path> estimates(request.files.begin(), std::prev(request.files.end()));
   const fs::path& given = request.files.back();
   const fs::path in_folder = file_in(given, "groundtruth.txt");
   std::error_code ignored;
   const bool by_layout = fs::is_directory(given, ignored) && !fs::exists(in_folder, ignored);
 
+  // Truth from a recording, or from a file
   const fs::path& truth_file = by_layout ? given : in_folder;
   const auto truth =
       by_layout ? dataset::recording_poses(given, console) : dataset::read_trajectory_file(truth_file);
-
   if (!truth) return tl::unexpected<core::Error>(truth.error());
-
   for (const std::string& note : truth->notes)
     console.warning(fmt::format("{}: {}", truth_file.string(), note));
-  const std::vector<std::string> others = evaluate::other_truths(truth_file);
 
+  // Other truths might have been meant
+  const std::vector<std::string> others = evaluate::other_truths(truth_file);
   if (!others.empty()) {
     console.info(fmt::format("the truth is {}; beside it there are {}: name a file to take another",
                              truth_file.string(), fmt::join(others, ", ")));
   }
-  std::vector<double> stamps;
 
+  // Frames for the share that was tracked
+  std::vector<double> stamps;
   if (!request.frames.empty()) {
     auto read = evaluate::read_frame_stamps(request.frames);
     if (!read) return tl::unexpected<core::Error>(read.error());
     stamps = std::move(*read);
   }
 
+  // Every estimate against its own truth
   const std::vector<std::string> names = estimate_names(estimates);
   std::vector<evaluate::NamedReport> reports;
   for (std::size_t i = 0; i < estimates.size(); ++i) {
     const fs::path file = file_in(estimates[i], "trajectory.txt");
     auto estimate = read_estimate(estimates[i]);
-
     if (!estimate) return tl::unexpected<core::Error>(estimate.error());
 
+    // KITTI has no stamps: poses are paired by number
     dataset::TrajectoryReading fitting_truth = *truth;
     if (auto paired = dataset::pair_by_number(*estimate, fitting_truth); !paired)
       return about(file, truth_file, paired.error());
 
+    // Errors with the given alignment
     for (const std::string& note : estimate->notes)
       console.warning(fmt::format("{}: {}", file.string(), note));
     auto report =
         evaluate::evaluate_trajectory(estimate->poses, fitting_truth.poses, request.options, stamps);
     if (!report) return about(file, truth_file, report.error());
-    evaluate::TrajectoryOptions of_components = request.options;
 
+    evaluate::TrajectoryOptions of_components = request.options;
     if (report->body && report->body->removed)  // too short to fit it to
       of_components.body = evaluate::body_text(report->body->body_from_camera);
     report->components = measure_components(estimates[i], fitting_truth.poses, of_components);
     reports.push_back({names[i], std::move(*report)});
   }
-
   return reports;
 }
 
 core::Result<void> evaluate_paths(TrajectoryRequest& request, Console& console) {
+  // All estimates are measured before anything is printed
   if (auto applied = request.flags.apply(); !applied) return applied;
   const auto reports = measure_paths(request, console);
   if (!reports) return tl::unexpected<core::Error>(reports.error());
 
+  // Text for each, or warnings only
   const bool single = reports->size() == 1;
   for (const evaluate::NamedReport& named : *reports) {
     if (request.json) {  // the printed table contains them
@@ -194,9 +204,12 @@ core::Result<void> evaluate_paths(TrajectoryRequest& request, Console& console) 
       }
       continue;
     }
+
+    // A title for each of several paths
     print("{}{}\n", single ? "" : "== " + named.name + "\n", evaluate::to_text(named.report));
   }
 
+  // One JSON document, or a table of all
   if (request.json) {
     print("{}", single ? evaluate::to_json(reports->front().report) : evaluate::to_json(*reports));
   } else if (!single) {
@@ -207,6 +220,7 @@ core::Result<void> evaluate_paths(TrajectoryRequest& request, Console& console) 
 }
 
 void add_trajectory(CLI::App& group, Session& session) {
+  // Estimates and truth
   const auto request = std::make_shared<TrajectoryRequest>();
   CLI::App* command =
       add_command(group, session, "trajectory", "Absolute and relative pose error against truth",
@@ -219,6 +233,7 @@ void add_trajectory(CLI::App& group, Session& session) {
       ->required()
       ->expected(2, CLI::detail::expected_max_vector_size);
 
+  // Frames and outputs
   command->add_option("--frames", request->frames, "The recording's rgb.txt, for the share of frames tracked")
       ->type_name("LIST");
   command->add_flag("--json", request->json, "Print JSON");

@@ -35,15 +35,16 @@ struct CloudRequest {
 /// Pairs of trajectories that the user named, else those beside cloud and reference.
 core::Result<std::vector<evaluate::TrajectoryPair>> read_pairs(const CloudRequest& request,
                                                                const fs::path& cloud) {
+  // Both lists must have the same length
   std::vector<evaluate::TrajectoryFiles> files;
   if (request.trajectories.size() != request.truths.size()) {
     return core::usage_error("--trajectory and --truth belong together: give as many of one as of the other");
   }
-
   for (std::size_t i = 0; i < request.trajectories.size(); ++i) {
     files.push_back({"", request.trajectories[i], request.truths[i]});
   }
 
+  // Without names, trajectories near the clouds
   if (files.empty()) files = evaluate::find_trajectories(cloud, file_in(request.reference, "reference.ply"));
   std::vector<evaluate::TrajectoryPair> pairs;
   for (const evaluate::TrajectoryFiles& pair : files) {
@@ -57,8 +58,8 @@ core::Result<std::vector<evaluate::TrajectoryPair>> read_pairs(const CloudReques
   return pairs;
 }
 
-/// Up in the reference's frame: as that is known; or as the cloud has it, which lies in this frame now, if no
-/// camera's path tells it either.
+/// The upward direction in the reference's frame: the reference's, else that of the aligned cloud. None: the
+/// picture estimates it, from the cameras' paths if there are any.
 std::optional<Eigen::Vector3d> up_of(const evaluate::Reference& reference, const cloud::CloudFrame& of_cloud,
                                      const geometry::Rigid3& reference_from_cloud, bool cameras) {
   if (reference.frame.up() == cloud::Up::kZ) return Eigen::Vector3d::UnitZ();
@@ -73,6 +74,7 @@ core::Result<void> write_error_clouds(const evaluate::SurfaceSamples& cloud,
                                       const evaluate::CloudReport& report,
                                       const std::vector<evaluate::TrajectoryPair>& pairs,
                                       const fs::path& folder) {
+  // Cameras and coordinates of the reference
   const Eigen::Vector3d& shift = reference.shift;
   geometry::Rigid3 placed = report.alignment.reference_from_cloud;  // of the files' coordinates
   ErrorView view;
@@ -82,6 +84,7 @@ core::Result<void> write_error_clouds(const evaluate::SurfaceSamples& cloud,
     for (geometry::StampedPose& pose : camera) pose.world_from_camera.translation -= shift;
   }
 
+  // The cloud, aligned with the reference
   evaluate::SurfaceSamples moved = cloud;
   placed.translation += placed.rotation * cloud.shift - shift;
   evaluate::move(placed, moved);
@@ -89,32 +92,36 @@ core::Result<void> write_error_clouds(const evaluate::SurfaceSamples& cloud,
   if (report.alignment.align != evaluate::CloudAlignment::kNone || reference.frame.known())
     moved.frame = reference.frame;
 
+  // Accuracy, from the cloud's side
   if (auto done = write_error_cloud(folder / "accuracy", "Distance of the cloud to the reference", moved,
                                     report.error_m, view);
       !done) {
     return done;
   }
 
+  // Completeness, from the reference's side
   return write_error_cloud(folder / "completeness", "Distance of the reference to the cloud",
                            {report.reference_samples, report.reference_normals, {}, shift, moved.frame},
                            report.reference_error_m, view);
 }
 
 core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
+  // Options that imply or exclude each other
   if (auto applied = request.flags.apply(); !applied) return applied;
   if (!request.trajectories.empty() && request.command->count("--align") == 0) {
     request.options.align = evaluate::CloudAlignment::kSe3;  // a given start implies alignment
   }
-
   if (!request.output.empty() && request.reference.empty()) {
     return core::usage_error("-o: colours by error need a REFERENCE to measure against");
   }
 
+  // The cloud in its own frame
   const fs::path cloud_file = file_in(request.cloud, "map.ply");
   auto cloud = evaluate::load_cloud(cloud_file);
   if (!cloud) return tl::unexpected<core::Error>(cloud.error());
   cloud->frame = maps::frame_of_cloud(cloud_file, cloud->frame);
 
+  // The reference may be absent
   core::Result<evaluate::Reference> reference;
   if (!request.reference.empty()) {
     const fs::path file = file_in(request.reference, "reference.ply");
@@ -123,6 +130,7 @@ core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
     reference->frame = maps::frame_of_cloud(file, reference->frame);
   }
 
+  // Trajectories start the alignment or set the view
   std::vector<evaluate::TrajectoryPair> pairs;
   const bool aligns = request.options.align != evaluate::CloudAlignment::kNone;
   if (!request.reference.empty() &&
@@ -132,6 +140,7 @@ core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
     pairs = std::move(*read);
   }
 
+  // All measures at once
   if (!cloud->shift.isZero(0.0)) session.console().info("shift: " + shift_text(cloud->shift));
   const auto report = evaluate::evaluate_cloud(*cloud, request.reference.empty() ? nullptr : &*reference,
                                                request.options, pairs, session.executor());
@@ -141,15 +150,17 @@ core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
     return tl::unexpected<core::Error>(std::move(error));
   }
 
+  // JSON keeps standard output, warnings use stderr
   if (request.json) {  // the printed table contains them
     for (const std::string& warning : report->warnings) session.console().warning(warning);
   }
-
   print("{}", request.json ? evaluate::to_json(*report) : evaluate::to_text(*report));
   if (!request.output.empty()) {
     auto done = write_error_clouds(*cloud, *reference, *report, pairs, request.output);
     if (!done) return done;
   }
+
+  // A failed alignment is no measurement
   if (!report->alignment.failed) return {};
   return core::failure(core::ErrorKind::kUntrustworthy,
                        fmt::format("{}: could not be aligned with {}", cloud_file.string(), reference->name));
@@ -158,6 +169,7 @@ core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
 }  // namespace
 
 void add_evaluate_cloud(CLI::App& group, Session& session) {
+  // Cloud and reference
   const auto request = std::make_shared<CloudRequest>();
   CLI::App* command =
       add_command(group, session, "cloud", "Accuracy, completeness, wall thickness of a cloud",
@@ -166,6 +178,7 @@ void add_evaluate_cloud(CLI::App& group, Session& session) {
   command->add_option("REFERENCE", request->reference,
                       "True surface (PLY, mesh or samples); without it only measures of the cloud itself");
 
+  // Paths to start from
   command
       ->add_option("--trajectory", request->trajectories,
                    "Estimated path to start the alignment from; sets --align to se3 unless it is given")
@@ -175,6 +188,7 @@ void add_evaluate_cloud(CLI::App& group, Session& session) {
       ->type_name("GT")
       ->allow_extra_args(false);
 
+  // Outputs and options
   command
       ->add_option("-o,--output", request->output,
                    "Write clouds coloured by error and pictures of them into this folder: "

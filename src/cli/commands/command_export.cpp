@@ -36,6 +36,7 @@ exports::Content content_of(const ExportCommand& command) {
   return exports::Content::kCloud;
 }
 
+/// One cloud per keyframe, from the store.
 core::Result<void> export_keyframes(const ExportCommand& command) {
   if (auto free = maps::check_output(command.keyframes, {}); !free) return free;
   auto place = maps::find_map(command.request.input);
@@ -55,11 +56,13 @@ core::Result<void> export_keyframes(const ExportCommand& command) {
 }
 
 core::Result<void> run_export(ExportCommand& command, Session& session) {
+  // The page needs no map
   if (command.page) {
     print("{}", exports::exports_page());
     return {};
   }
 
+  // Input and at least one output
   exports::ExportRequest& request = command.request;
   if (request.input.empty())
     return core::usage_error("MAP is required: a result folder, map.db, or a cloud file");
@@ -67,11 +70,13 @@ core::Result<void> run_export(ExportCommand& command, Session& session) {
   if (request.output.empty() && command.keyframes.empty())
     return core::usage_error("no output is named; name a file with -o or a folder with --keyframes");
 
+  // Keyframes, alone or with a file
   if (!command.keyframes.empty()) {
     auto done = export_keyframes(command);
     if (!done || request.output.empty()) return done;
   }
 
+  // Content, options and pictures of the export
   request.content = content_of(command);
   request.given = command.flags.given();
   request.open = recording_opener(session);
@@ -80,6 +85,7 @@ core::Result<void> run_export(ExportCommand& command, Session& session) {
     work();
   };
 
+  // The export itself
   Console& console = session.console();
   auto summary = exports::write_export(request, session.executor(), console, console.counting("views"));
   console.end_progress();
@@ -112,6 +118,7 @@ void add_export(CLI::App& app, Session& session) {
   CLI::App* command = add_command(app, session, "export", "Write a map in formats of other programs",
                                   [&session, state] { return run_export(*state, session); });
 
+  // Input, output and format
   exports::ExportRequest& request = state->request;
   command->add_option("MAP", request.input,
                       "Result folder (of an interrupted run, too), map.db, or cloud file");
@@ -119,10 +126,13 @@ void add_export(CLI::App& app, Session& session) {
       ->add_option("-o,--output", request.output,
                    "File to write, or a folder for formats that consist of several files")
       ->type_name("FILE|FOLDER");
+
+  // Formats are listed below the options
   command
       ->add_option("--format", request.format, "One of the formats below (default: by the output's ending)")
       ->type_name("NAME");
 
+  // Parts that only stores have
   command
       ->add_option("--keyframes", state->keyframes,
                    "Write the cloud of every keyframe as DIR/<number>.ply, from map.db")
@@ -132,22 +142,24 @@ void add_export(CLI::App& app, Session& session) {
                    "Robot whose map to use, for an interrupted run of several robots")
       ->type_name("NAME");
 
+  // Pictures come from the recordings
   command
       ->add_option("--recording", request.recordings,
                    "Recordings for the pictures, one per robot (default: those the map was made from)")
       ->type_name("INPUT")
       ->allow_extra_args(false);
 
+  // Part of the map
   CLI::Option* what = command->add_option("--what", state->what, "Part of the map to write (default: cloud)")
                           ->check(CLI::IsMember({"cloud", "trajectory", "keyframes", "lines"}));
   CLI::Option* trajectory =
       command->add_flag("--trajectory", state->trajectory, "The same as --what trajectory")->excludes(what);
-
   command->add_flag("--lines", state->lines, "The same as --what lines")
       ->excludes(what)
       ->excludes(trajectory);
   command->add_flag("--mesh", state->mesh, "Write the cloud as a mesh, .ply, .obj or .glb")->excludes(what);
 
+  // Outputs, options and the table of formats
   command->add_flag("--force", request.replace, "Replace the folder of an earlier export");
   command->add_flag("--describe", state->page, "Print a page about all formats (docs/guide/exports.md)");
   add_progress_option(*command, session);

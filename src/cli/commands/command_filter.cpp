@@ -42,6 +42,7 @@ struct FilterRequest {
   OptionFlags flags;
 };
 
+/// A shipped chain or a file, with the filters of plugins.
 core::Result<cloud::FilterChain> load_chain(const std::string& name, const Session& session) {
   const auto pipelines = session.pipelines_folder();
   if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
@@ -54,24 +55,28 @@ core::Result<cloud::FilterChain> load_chain(const std::string& name, const Sessi
 
 /// Reports a problem with the output before anything is read.
 core::Result<void> check_outputs(const FilterRequest& request, const cloud::FilterChain& chain) {
+  // The ending decides the format
   const fs::path& output = request.files.back();
   const std::string extension = core::ending_of(output);
   if (extension != ".ply" && extension != ".pcd") {
     return core::usage_error(fmt::format("{}: clouds are written as .ply or .pcd", output.string()));
   }
 
+  // Missing folders are not created
   std::error_code ec;
   const fs::path folder = output.parent_path();
   if (!folder.empty() && !fs::is_directory(folder, ec)) {
     return core::output_error(fmt::format("{}: there is no folder {}", output.string(), folder.string()));
   }
 
+  // Two writers of one file
   for (const std::string& written : chain.writes()) {
     if (fs::absolute(written).lexically_normal() == fs::absolute(output).lexically_normal()) {
       return core::usage_error(output.string() + ": a filter of the chain writes this file already");
     }
   }
 
+  // Inputs and results are never overwritten
   const std::vector<fs::path> inputs(request.files.begin(), request.files.end() - 1);
   for (const std::string& written : chain.writes()) {
     if (auto free = maps::check_output(written, inputs); !free) return free;
@@ -82,6 +87,7 @@ core::Result<void> check_outputs(const FilterRequest& request, const cloud::Filt
 /// The inputs one after the other, in the frame of the first.
 core::Result<cloud::CloudPtr> read_inputs(const FilterRequest& request, cloud::CloudColumns& columns,
                                           Eigen::Vector3d& shift, cloud::CloudFrame& frame) {
+  // All inputs become one cloud
   cloud::CloudPtr all;
   for (std::size_t i = 0; i + 1 < request.files.size(); ++i) {
     auto file = cloud::read_cloud(request.files[i], cloud::LargeCoordinates::kShifted);
@@ -94,6 +100,7 @@ core::Result<cloud::CloudPtr> read_inputs(const FilterRequest& request, cloud::C
       columns = std::move(file->columns);
       shift = file->shift;
       frame = std::move(file->frame);
+
     } else {
       // The others must fit into it.
       auto fits = cloud::check_one_frame(request.files.front().string(), shift, request.files[i].string(),
@@ -102,6 +109,8 @@ core::Result<cloud::CloudPtr> read_inputs(const FilterRequest& request, cloud::C
         fits = cloud::check_same_up(request.files.front().string(), frame, request.files[i].string(),
                                     file->frame);
       if (!fits) return tl::unexpected<core::Error>(fits.error());
+
+      // Appended in the coordinates of the first
       cloud::change_shift(*file->cloud, file->shift, shift);
       cloud::append_columns(columns, all->size(), file->columns, file->cloud->size());
       *all += *file->cloud;
@@ -130,19 +139,22 @@ core::Result<void> something_left(const cloud::FilterChain& chain,
 /// The chain tile by tile.
 core::Result<void> filter_tiles(const FilterRequest& request, const cloud::FilterChain& chain,
                                 Session& session) {
+  // Tiles are read and written as a stream
   const fs::path& output = request.files.back();
   if (core::ending_of(output) != ".ply")
     return core::usage_error(output.string() + ": with --tiles clouds are written as .ply");
   const std::vector<fs::path> inputs(request.files.begin(), request.files.end() - 1);
 
+  // The frame of the first cloud
   cloud::CloudFrame frame = maps::frame_of_cloud(inputs.front(), cloud::frame_of_ply(inputs.front()));
   Console& console = session.console();
   const auto report = cloud::filter_in_tiles(
-      chain, inputs, output, request.tiles.tiles_m, frame, &session.executor(),
+      chain, {inputs, output}, request.tiles.tiles_m, frame, &session.executor(),
       [&console](std::size_t done, std::size_t total) { console.progress(done, total, "tiles"); });
   console.end_progress();
   if (!report) return tl::unexpected<core::Error>(report.error());
 
+  // An empty result is not trustworthy
   if (!session.quiet) {
     print("{} of {} points, in {} tiles of at most {} points with their margins\n", report->points_out,
           report->points_in, report->tiles, report->fullest);
@@ -153,10 +165,12 @@ core::Result<void> filter_tiles(const FilterRequest& request, const cloud::Filte
 }
 
 core::Result<void> filter(FilterRequest& request, Session& session) {
+  // Chain and options
   if (auto given = request.flags.apply(); !given) return given;
   const auto chain = load_chain(request.chain, session);
   if (!chain) return tl::unexpected<core::Error>(chain.error());
 
+  // Problems are found before clouds are read
   const fs::path& output = request.files.back();
   cloud::FilterContext context;
   context.executor = &session.executor();
@@ -164,6 +178,7 @@ core::Result<void> filter(FilterRequest& request, Session& session) {
   if (auto fit = chain->ready(context); !fit) return fit;
   if (request.tiles.tiles_m > 0.0) return filter_tiles(request, *chain, session);
 
+  // Columns, frame and shift travel with the points
   cloud::CloudColumns columns;
   cloud::CloudFrame frame;
   auto input = read_inputs(request, columns, context.shift, frame);
@@ -172,6 +187,7 @@ core::Result<void> filter(FilterRequest& request, Session& session) {
   context.made_columns = &columns;
   context.frame = &frame;
 
+  // One report per filter
   Console& console = session.console();
   std::vector<cloud::FilterReport> reports;
   const auto filtered =
@@ -180,16 +196,17 @@ core::Result<void> filter(FilterRequest& request, Session& session) {
                      console.progress(done, total, type.empty() ? "filters" : type.c_str());
                    });
 
+  // A table and the filtered cloud
   console.end_progress();
   if (!filtered) return tl::unexpected<core::Error>(filtered.error());
   if (!session.quiet) print("{}", cloud::to_table(reports));
   if (!session.quiet && !context.shift.isZero(0.0)) print("shift: {}\n", shift_text(context.shift));
   auto written = cloud::write_cloud(output, **filtered, columns, context.shift, frame.comments());
   if (!written) return written;
-
   return something_left(*chain, reports);
 }
 
+/// One line per filter.
 int list_filters(Session& session) {
   const auto registry = session.filters();
   if (!registry) return session.fail(registry.error());
@@ -200,6 +217,7 @@ int list_filters(Session& session) {
 }
 
 core::Result<void> describe_filter(const std::string& name, const Session& session) {
+  // Without a name, the page of all filters
   const auto registry = session.filters();
   if (!registry) return tl::unexpected<core::Error>(registry.error());
   if (name.empty()) {
@@ -207,12 +225,14 @@ core::Result<void> describe_filter(const std::string& name, const Session& sessi
     return {};
   }
 
+  // A misspelt name gets a suggestion
   const cloud::FilterInfo* info = registry->find(name);
   if (info == nullptr) {
     return core::usage_error(
         fmt::format("there is no filter '{}'{}", name, cloud::missing_filter_hint(name, *registry)));
   }
 
+  // Options with their defaults
   print("{}: {}\n\n{}\n\noptions:\n", info->type, info->summary, info->details);
   core::OptionTable table;
   const auto made = info->make();
@@ -220,7 +240,6 @@ core::Result<void> describe_filter(const std::string& name, const Session& sessi
   for (const core::OptionSpec& spec : table.specs()) {
     print("  {:<20} {} (default: {})\n", spec.key, spec.help, spec.default_value);
   }
-
   print("\nexample:\n{}\n", info->example);
   return {};
 }
@@ -228,11 +247,13 @@ core::Result<void> describe_filter(const std::string& name, const Session& sessi
 }  // namespace
 
 void add_filter(CLI::App& app, Session& session) {
+  // The chain and its files
   const auto request = std::make_shared<FilterRequest>();
   CLI::App* command = add_command(app, session, "filter", "Run a filter chain on a cloud file",
                                   [&session, request] { return filter(*request, session); });
   command->add_option("CHAIN", request->chain, "Filter chain: a file or a shipped name")->required();
 
+  // Files to read and the one to write
   command
       ->add_option(
           "FILES", request->files,
@@ -240,15 +261,19 @@ void add_filter(CLI::App& app, Session& session) {
       ->required()
       ->type_name("IN... OUT")
       ->expected(2, -1);
+
+  // Tiles, progress and plugins
   request->flags.add(*command, request->tiles);
   add_progress_option(*command, session);
   add_plugin_option(*command, session);
 
+  // The filters themselves
   CLI::App* group = add_group(app, "filters", "List, describe and check filters");
   add_plugin_option(
       *add_command(*group, session, "list", "List all filters", [&session] { return list_filters(session); }),
       session);
 
+  // One filter or all
   const auto name = std::make_shared<std::string>();
   CLI::App* describe = add_command(
       *group, session, "describe",
@@ -257,6 +282,7 @@ void add_filter(CLI::App& app, Session& session) {
   describe->add_option("NAME", *name, "Type of the filter");
   add_plugin_option(*describe, session);
 
+  // Chains are checked without clouds
   CLI::App* check =
       add_command(*group, session, "check", "Check a filter chain without running it", [&session, name] {
         const auto chain = load_chain(*name, session);
@@ -264,7 +290,6 @@ void add_filter(CLI::App& app, Session& session) {
         print("{}: {} filters, nothing wrong\n", *name, chain->size());
         return 0;
       });
-
   check->add_option("CHAIN", *name, "Filter chain: a file or a shipped name")->required();
   add_plugin_option(*check, session);
 }

@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::size_t kMaxMaps = 255;
 
+/// Fuses the maps and prints the summary.
 int fuse(Session& session, pipeline::FuseRequest request) {
   if (request.maps.size() > kMaxMaps) {
     return session.fail(
@@ -28,6 +29,7 @@ int fuse(Session& session, pipeline::FuseRequest request) {
 
 }  // namespace
 
+/// Options of fuse.
 void add_fuse(CLI::App& app, Session& session) {
   const auto request = std::make_shared<pipeline::FuseRequest>();
   CLI::App* command =

@@ -20,34 +20,39 @@ const char* const kTwoTerminals =
 
 int hub(Session& session, net::HubRequest request, double quota_gb, const std::string& publish,
         const PageAddress& page) {
+  // Limits and identity of the hub
   if (auto equipped = session.equip(request.fuse); !equipped) return session.fail(equipped.error());
-
   request.quota_bytes = static_cast<std::uint64_t>(quota_gb * 1e9);
   request.fresh_id = fresh_id();
 
+  // A finished hub needs no network
   const auto finished =
       request.resume ? pipeline::is_finished(request.fuse.output, request.fuse.replace) : false;
   if (!finished) return session.fail(finished.error());
   if (*finished) {
     session.console().info(request.fuse.output.string() + ": is finished; there is nothing to continue");
-
     return 0;
   }
+
+  // Publication and display
   if (auto prepared =
           prepare_publisher(session, {publish, {}, {}, 1}, net::PublishedNames::kOfEach, "", request.fuse);
       !prepared)
     return session.fail(prepared.error());
 
+  // The page shows all robots
   Console& console = session.console();
   const auto live = live_map(page, request.fuse.output, console);
   if (!live) return session.fail(live.error());
 
+  // Robots move when they meet
   if (*live) {
     request.placed = [&](const std::string& robot, const geometry::Rigid3& shared_from_robot) {
       (*live)->place(robot, shared_from_robot);
     };
   }
 
+  // Status lines on the terminal and the page
   const auto summary = net::run_hub(
       request, session.executor(), console, stop_on_signals(),
       [&](const std::string& line) {
@@ -62,6 +67,7 @@ int hub(Session& session, net::HubRequest request, double quota_gb, const std::s
 }  // namespace
 
 void add_hub(CLI::App& app, Session& session) {
+  // Shared by the command and its options
   const auto request = std::make_shared<net::HubRequest>();
   const auto quota_gb = std::make_shared<double>(20.0);
   const auto publish = std::make_shared<std::string>();
@@ -72,8 +78,8 @@ void add_hub(CLI::App& app, Session& session) {
                     return hub(session, *request, *quota_gb, *publish, *page);
                   });
 
+  // Output and number of robots
   command->footer(kTwoTerminals);
-
   command->add_option("-o,--output", request->fuse.output, "Folder for the result")
       ->required()
       ->type_name("OUT");
@@ -81,14 +87,15 @@ void add_hub(CLI::App& app, Session& session) {
       ->type_name("N")
       ->check(CLI::Range(1, 64));
 
+  // Network, publication and display
   add_network_options(*command, request->network);
   add_publish_option(*command, *publish);
   add_live_options(*command, *page);
 
+  // Limits and the frame of the result
   command->add_option("--quota", *quota_gb, "Disk space for the map of each robot, GB (default: 20)")
       ->type_name("GB")
       ->check(CLI::PositiveNumber);
-
   command->add_option("--anchor", request->fuse.anchor, "Robot whose map defines the frame of the result")
       ->type_name("NAME");
 
@@ -98,6 +105,7 @@ void add_hub(CLI::App& app, Session& session) {
           "Finished map (result folder or map.db) that all robots visit, as for map; it stays as it is")
       ->type_name("MAP");
 
+  // Interrupted hubs and pipelines
   command->add_flag("--resume", request->resume, "Continue an interrupted hub from OUT.partial");
   add_pipeline_options(*command, session, request->fuse);
 }

@@ -38,34 +38,41 @@ struct InfoRequest {
 };
 
 core::Result<void> describe_store(const std::filesystem::path& file) {
+  // Header and counts, without the map
   const auto reader = maps::StoreReader::open(file);
   if (!reader) return tl::unexpected<core::Error>(reader.error());
   const auto contents = reader->contents();
   if (!contents) return tl::unexpected<core::Error>(contents.error());
 
+  // Robots and size on disk
   const maps::StoreHeader& header = reader->header();
   std::string robots;
   for (const maps::RobotInfo& robot : header.robots) robots += (robots.empty() ? "" : ", ") + robot.name;
   std::error_code ec;
   const double file_mb = static_cast<double>(std::filesystem::file_size(file, ec)) / 1e6;
 
+  // One key and value per line
   print("store: {}\nstore.format: {}\nstore.program: plumbline {}\nstore.robot: {}\n", file.string(),
         header.format, header.program_version, robots);
   print("store.complete: {}\n",
         contents->complete ? "yes" : "no; map --resume continues it, export and render read it");
   print("store.keyframes: {}\nstore.points: {}\nstore.lines: {}\n", contents->keyframes, contents->points,
         contents->lines);
+
+  // Constraints and clouds
   print("store.surface_edges: {}\nstore.loops: {}\nstore.frames: {}\n", contents->edges, contents->loops,
         contents->frames);
   print("store.clouds: {} of keyframes, {} of frames between\n", contents->keyframe_clouds,
         contents->frame_clouds);
 
+  // Attachments and sizes
   for (const std::string& name : contents->attachments) print("store.attachment: {}\n", name);
   print("store.size_mb: {:.1f}\nstore.clouds_mb: {:.1f}\n", file_mb,
         static_cast<double>(contents->cloud_bytes) / 1e6);
   return {};
 }
 
+/// The summary as text or as JSON.
 core::Result<void> describe_result(const std::filesystem::path& folder, bool json) {
   const std::filesystem::path file = folder / "summary.json";
   const auto summary = core::read_json(file);
@@ -79,9 +86,11 @@ core::Result<void> describe_result(const std::filesystem::path& folder, bool jso
 }
 
 core::Result<void> describe_cloud(const std::filesystem::path& file) {
+  // Large coordinates are read with a shift
   const auto read = cloud::read_cloud(file, cloud::LargeCoordinates::kShifted);
   if (!read) return tl::unexpected<core::Error>(read.error());
 
+  // Bounds of the finite points
   Eigen::Array3f low = Eigen::Array3f::Constant(INFINITY);
   Eigen::Array3f high = Eigen::Array3f::Constant(-INFINITY);
   for (const cloud::Point& p : *read->cloud) {
@@ -91,17 +100,20 @@ core::Result<void> describe_cloud(const std::filesystem::path& file) {
     high = high.max(position);
   }
 
+  // An empty cloud has no bounds
   if (read->cloud->empty()) {
     print("points: 0\nnote: the cloud is empty\n");
     return {};
   }
 
+  // Properties of the file
   print("points: {}\nwithout position: {}\n", read->cloud->size(), read->nan_points);
   if (read->cloud->isOrganized()) print("organised: {} x {}\n", read->cloud->width, read->cloud->height);
   print("colour: {}\nnormals: {}\n", read->has_color ? "yes" : "no", read->has_normals ? "yes" : "no");
   if (read->has_normals) print("without normal: {}\n", read->nan_normals);
   if (!read->shift.isZero(0.0)) print("shift: {}\n", shift_text(read->shift));
 
+  // Bounds in the file's coordinates
   if ((low <= high).all()) {
     const Eigen::Array3d from = low.cast<double>() + read->shift.array();
     const Eigen::Array3d to = high.cast<double>() + read->shift.array();
@@ -110,10 +122,10 @@ core::Result<void> describe_cloud(const std::filesystem::path& file) {
     const Eigen::Array3f size = high - low;
     print("size: {:.3f} x {:.3f} x {:.3f} m\n", size.x(), size.y(), size.z());
   }
-
   return {};
 }
 
+/// Summary and store, as far as they exist.
 core::Result<void> describe_map(const maps::MapPlace& place, bool json) {
   if (json && !place.result)
     return core::usage_error(fmt::format("--json: {} has no summary.json yet", place.store.string()));
@@ -128,6 +140,7 @@ bool is_trajectory(const std::filesystem::path& file) {
   return (file.extension() == ".txt" || file.extension() == ".csv") && dataset::holds_poses(file);
 }
 
+/// Length, times and format of a path.
 void describe_path(const dataset::TrajectoryReading& reading) {
   const geometry::Trajectory& path = reading.poses;
   double length_m = 0.0;
@@ -155,6 +168,7 @@ void describe_signs(const dataset::FrameSource& source) {
   }
 }
 
+/// Layout, camera and signs of a wrong calibration.
 core::Result<void> describe_recording(Session& session, InfoRequest& request) {
   const auto pipelines = session.pipelines_folder();
   if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
@@ -175,6 +189,7 @@ core::Result<void> describe_bag(Session& session, InfoRequest& request) {
   return describe_recording(session, request);
 }
 
+/// Topics and rates of a live camera.
 core::Result<void> describe_live(InfoRequest& request) {
   const auto stream = net::open_live_stream(request.input, request.open.topics);
   if (!stream) return tl::unexpected<core::Error>(stream.error());
@@ -186,11 +201,13 @@ core::Result<void> describe_live(InfoRequest& request) {
 }
 
 core::Result<void> info(Session& session, InfoRequest& request) {
+  // --format json means the same as --json
   if (request.open.format == "json") {
     request.json = true;
     request.open.format = "auto";
   }
 
+  // Addresses need no file
   std::error_code ec;
   const std::filesystem::path path = request.input;
   const auto map = maps::find_map(path);  // also of a run that was interrupted and has left no `path`
@@ -200,11 +217,13 @@ core::Result<void> info(Session& session, InfoRequest& request) {
   if (dataset::is_live_address(request.input)) return describe_live(request);
   if (synth::is_synth_url(request.input)) return describe_recording(session, request);
 
+  // A path is a map, or something else
   if (map) return describe_map(*map, request.json);
   if (!std::filesystem::exists(path, ec)) {
     return core::input_error(fmt::format("{}: no such map, cloud or recording", request.input));
   }
 
+  // Bags, paths, clouds and recordings
   if (dataset::is_bag(path)) return describe_bag(session, request);
   if (!std::filesystem::is_directory(path, ec) && !dataset::is_recording_file(path)) {
     if (!is_trajectory(path)) return describe_cloud(path);
@@ -219,6 +238,7 @@ core::Result<void> info(Session& session, InfoRequest& request) {
 }  // namespace
 
 void add_info(CLI::App& app, Session& session) {
+  // The input
   const auto request = std::make_shared<InfoRequest>();
   CLI::App* command = add_command(app, session, "info", "Describe a recording, a map or a cloud",
                                   [&session, request] { return info(session, *request); });
@@ -234,12 +254,12 @@ void add_info(CLI::App& app, Session& session) {
   add_topic_option(*command, request->open);
   auto formats = dataset::layout_names();
 
+  // json is accepted, although it is not a layout
   formats.emplace_back("json");
   command
       ->add_option("--format", request->open.format,
                    "Layout of the recording (default: auto); json: as --json")
       ->check(CLI::IsMember(formats));
-
   command->add_flag("--json", request->json, "Print all that a result's summary.json says, as JSON");
 }
 

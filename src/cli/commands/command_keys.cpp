@@ -19,6 +19,7 @@ struct KeysRequest {
 };
 using Action = core::Result<void> (*)(const std::filesystem::path&, const std::vector<std::string>&);
 
+/// A command that changes a folder of keys.
 void add_action(CLI::App& group, Session& session, const char* name, const char* help, Action action,
                 const char* then) {
   const auto request = std::make_shared<KeysRequest>();
@@ -38,6 +39,7 @@ void add_action(CLI::App& group, Session& session, const char* name, const char*
 
 }  // namespace
 
+/// Commands of keys.
 void add_keys(CLI::App& app, Session& session) {
   CLI::App* group = add_group(app, "keys", "Make and revoke keys for hub and robots (--security)");
   add_action(*group, session, "create", "Make an authority, and keys for a hub and robots", &net::create_keys,

@@ -11,6 +11,7 @@
 namespace plumbline::cli {
 namespace {
 
+/// Localises without changing the known map.
 int localize(Session& session, pipeline::MapRequest request, const PublishRequest& publish) {
   if (auto equipped = session.equip(request); !equipped) return session.fail(equipped.error());
   prepare_live(request);
@@ -26,6 +27,7 @@ int localize(Session& session, pipeline::MapRequest request, const PublishReques
 
 }  // namespace
 
+/// Options of localize.
 void add_localize(CLI::App& app, Session& session) {
   const auto request = std::make_shared<pipeline::MapRequest>();
   const auto publish = std::make_shared<PublishRequest>();

@@ -33,6 +33,7 @@ std::string stopped_after(const std::filesystem::path& result) {
 
 int map(Session& session, pipeline::MapRequest request, const std::vector<std::string>& inputs,
         PublishRequest publish, const PageAddress& page) {
+  // Given poses need another pipeline
   const bool as_given = request.open.poses == dataset::PoseUse::kGiven;
   if (as_given && request.pipeline == pipeline::MapRequest().pipeline) request.pipeline = "known_poses";
   request.input = inputs.front();
@@ -40,6 +41,7 @@ int map(Session& session, pipeline::MapRequest request, const std::vector<std::s
 
   if (auto equipped = session.equip(request); !equipped) return session.fail(equipped.error());
 
+  // A finished run is not continued
   const auto finished = request.resume ? pipeline::is_finished(request.output, request.replace) : false;
   if (!finished) return session.fail(finished.error());
   if (*finished) {
@@ -50,6 +52,7 @@ int map(Session& session, pipeline::MapRequest request, const std::vector<std::s
                                        request.output.string(), stopped)});
     }
 
+    // Nothing to do is not an error
     if (!session.quiet) {
       print(
           "{}: is finished; there is nothing to continue; to map again, with other options too, leave "
@@ -59,17 +62,20 @@ int map(Session& session, pipeline::MapRequest request, const std::vector<std::s
     return 0;
   }
 
+  // Live cameras and publication
   prepare_live(request);
   publish.robots = inputs.size();
   if (auto prepared = prepare_publisher(session, publish, net::PublishedNames::kOfOne, "", request);
       !prepared)
     return session.fail(prepared.error());
 
+  // The map while it grows
   Console& console = session.console();
   const auto live =
       live_map(page, request.into.empty() ? request.output : pipeline::visit_folder(request.output), console);
   if (!live) return session.fail(live.error());
 
+  // From recording to result
   const auto summary = pipeline::map_recording(request, session.executor(), console, stop_on_signals(),
                                                console.counting("frames"));
   return session.finish(summary, request.output);
@@ -96,6 +102,7 @@ void add_recording_options(CLI::App& command, pipeline::MapRequest& request) {
   add_live_options(command, request);
 }
 
+/// Options that map and robot share.
 void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& request) {
   add_recording_options(command, request);
   const std::map<std::string, dataset::PoseUse> uses = {{"prior", dataset::PoseUse::kPrior},
@@ -113,12 +120,14 @@ void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& 
 }
 
 void add_map(CLI::App& app, Session& session) {
+  // Shared by the command and its options
   const auto request = std::make_shared<pipeline::MapRequest>();
   const auto inputs = std::make_shared<std::vector<std::string>>();
   const auto publish = std::make_shared<PublishRequest>();
   const auto page = std::make_shared<PageAddress>();
   const auto poses_are = std::make_shared<std::string>();
 
+  // Conventions of poses become options of stages
   CLI::App* command =
       add_command(app, session, "map", "Map a recording: trajectory, dense cloud, pictures",
                   [&session, request, inputs, publish, page, poses_are] {
@@ -129,6 +138,7 @@ void add_map(CLI::App& app, Session& session) {
                     return map(session, *request, *inputs, *publish, *page);
                   });
 
+  // Input and output
   command
       ->add_option(
           "INPUT", *inputs,
@@ -136,9 +146,9 @@ void add_map(CLI::App& app, Session& session) {
           "synth:SCENE?frames=900&texture=none&seed=3; give several recordings, one per robot, to fuse "
           "them into one map")
       ->required();
-
   command->add_option("-o,--output", request->output, "Folder for the result")->required()->type_name("OUT");
 
+  // Conventions of given poses
   command
       ->add_option(
           "--poses-are", *poses_are,
@@ -146,6 +156,7 @@ void add_map(CLI::App& app, Session& session) {
           "backwards), wxyz (quaternions begin with w)")
       ->check(CLI::IsMember({"inverted", "opengl", "wxyz"}));
 
+  // A map that exists already
   command
       ->add_option(
           "--into", request->into,
@@ -153,10 +164,10 @@ void add_map(CLI::App& app, Session& session) {
           "its frame, without what is gone")
       ->type_name("MAP");
 
+  // Display, pipeline and debugging
   add_frames_options(*command, *publish);
   add_map_options(*command, session, *request);
   add_live_options(*command, *page);
-
   command
       ->add_option("--debug-video", request->debug_video,
                    "Also write a picture of every frame with what the tracker sees")

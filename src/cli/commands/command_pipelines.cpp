@@ -37,6 +37,7 @@ core::Result<pipeline::StageRegistry> all_stages(const Session& session) {
   return registry;
 }
 
+/// A shipped pipeline or a file, with overridden options.
 core::Result<pipeline::Graph> load(const PipelinesRequest& request, const pipeline::StageRegistry& registry,
                                    const Session& session) {
   const auto folder = session.pipelines_folder();
@@ -53,6 +54,7 @@ core::Result<pipeline::StageTypePtr> find_stage(const std::string& name,
   return core::usage_error(fmt::format("there is no stage '{}'{}", name, core::hint(name, registry.names())));
 }
 
+/// Shipped pipelines and all types of stages.
 int list(Session& session, const PipelinesRequest& /*request*/, const pipeline::StageRegistry& registry) {
   const auto folder = session.pipelines_folder();
   if (!folder) return session.fail(folder.error());
@@ -66,6 +68,7 @@ int list(Session& session, const PipelinesRequest& /*request*/, const pipeline::
   return 0;
 }
 
+/// Types and rates of a stage's inputs or outputs.
 void describe_ports(const std::vector<pipeline::Port>& ports, const char* title) {
   if (ports.empty()) return;
   print("\n{}:\n", title);
@@ -77,11 +80,13 @@ void describe_ports(const std::vector<pipeline::Port>& ports, const char* title)
 }
 
 int describe(Session& session, const PipelinesRequest& request, const pipeline::StageRegistry& registry) {
+  // Without a name, the page of all stages
   if (request.name.empty()) {
     print("{}", pipeline::stages_reference(registry, request.all));
     return 0;
   }
 
+  // One stage as Markdown
   const auto type = find_stage(request.name, registry);
   if (!type) return session.fail(type.error());
   if (request.markdown) {
@@ -89,12 +94,12 @@ int describe(Session& session, const PipelinesRequest& request, const pipeline::
     return 0;
   }
 
+  // Ports and options on the terminal
   print("{}: {}\n", (*type)->name, (*type)->help);
   describe_ports((*type)->inputs, "inputs");
   describe_ports((*type)->outputs, "outputs");
   const std::vector<core::OptionSpec> options = pipeline::shown_options(**type, request.all);
   if (!options.empty()) print("\noptions:\n");
-
   for (const core::OptionSpec& spec : options) {
     print("  {:<22} {} (allowed: {}; default: {})\n", spec.key, spec.help, core::allowed_text(spec),
           spec.default_value);
@@ -111,6 +116,7 @@ int check(Session& session, const PipelinesRequest& request, const pipeline::Sta
   return 0;
 }
 
+/// JSON Schema of pipelines or of one stage.
 int schema(Session& session, const PipelinesRequest& request, const pipeline::StageRegistry& registry) {
   if (request.name.empty()) {
     print("{}", pipeline::pipeline_schema(registry));
@@ -122,6 +128,7 @@ int schema(Session& session, const PipelinesRequest& request, const pipeline::St
   return 0;
 }
 
+/// The graph as a picture, or in Graphviz's language.
 int graph(Session& session, const PipelinesRequest& request, const pipeline::StageRegistry& registry) {
   const auto loaded = load(request, registry, session);
   if (!loaded) return session.fail(loaded.error());
@@ -142,7 +149,7 @@ void add_pipeline_arguments(CLI::App& command, const RequestPtr& request) {
       ->allow_extra_args(false);
 }
 
-/// Below `filters`; beside the schema of pipelines, which has it inside.
+/// Adds `filters schema`; the schema of pipelines contains the same.
 void add_chain_schema(CLI::App& filters, Session& session) {
   CLI::App* command =
       add_command(filters, session, "schema", "JSON Schema of filter chains, for editors", [&session] {
@@ -157,6 +164,7 @@ void add_chain_schema(CLI::App& filters, Session& session) {
 }  // namespace
 
 void add_pipelines(CLI::App& app, Session& session) {
+  // Stages of plugins are known to every command
   CLI::App* group = add_group(app, "pipelines", "List, describe, check and draw pipelines and their stages");
   const auto request = std::make_shared<PipelinesRequest>();
   const auto command = [&](const char* name, const char* help,
@@ -167,15 +175,16 @@ void add_pipelines(CLI::App& app, Session& session) {
     });
   };
 
+  // Pipelines and stages
   CLI::App* listed = command("list", "List the shipped pipelines and all stages", list);
   add_plugin_option(*listed, session);
-
   CLI::App* described = command(
       "describe", "Describe a stage's ports and options; without STAGE the whole reference", describe);
   described->add_option("STAGE", request->name, "Type of a stage");
   described->add_flag("--markdown", request->markdown, "As a section of the reference page");
   described->add_flag("--all", request->all, "Include advanced options");
 
+  // Files are checked without running them
   CLI::App* checked = command("check", "Check a pipeline without running it", check);
   add_pipeline_arguments(*checked, request);
   add_plugin_option(*checked, session);
@@ -184,6 +193,7 @@ void add_pipelines(CLI::App& app, Session& session) {
   schemed->add_option("STAGE", request->name, "Type of a stage");
   add_plugin_option(*schemed, session);
 
+  // A picture of the graph
   CLI::App* drawn = command("graph", "Draw a pipeline; without -o print it in Graphviz's language", graph);
   add_pipeline_arguments(*drawn, request);
   add_plugin_option(*drawn, session);

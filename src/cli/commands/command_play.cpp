@@ -23,6 +23,7 @@ struct PlayRequest {
 };
 
 core::Result<void> play(Session& session, PlayRequest& request) {
+  // The address without topics
   const auto address = net::parse_ros2_address(request.address);
   if (!address) return tl::unexpected<core::Error>(address.error());
   if (address->topics.any()) {
@@ -30,24 +31,26 @@ core::Result<void> play(Session& session, PlayRequest& request) {
         fmt::format("{}: topics cannot be named here: they are those of a camera's node", request.address));
   }
 
+  // The recording with its calibration
   const auto pipelines = session.pipelines_folder();
   if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
   request.open.cameras_folder = *pipelines / "cameras";
-
   Console& console = session.console();
   const auto source =
       pipeline::open_input(request.input, request.open, *pipelines / "scenes", session.executor(), console);
   if (!source) return tl::unexpected<core::Error>(source.error());
 
+  // A camera's node on the network
   const auto sink = net::open_ros2_sink(*address);
   if (!sink) return tl::unexpected<core::Error>(sink.error());
 
+  // Until the end or Ctrl-C
   request.play.stop = stop_on_signals();
   request.play.progress = console.counting("frames");
-
   const auto summary = dataset::play_recording(**source, **sink, request.play, console);
   console.end_progress();
 
+  // Late and unreadable frames are reported
   if (!summary) return tl::unexpected<core::Error>(summary.error());
   if (summary->unreadable > 0)
     console.warning(fmt::format("{} frames cannot be read and were left out", summary->unreadable));
@@ -69,6 +72,7 @@ void add_play(CLI::App& app, Session& session) {
       "In another one:     plumbline play RECORDING 'ros2://7?interface=lo' --loop\n"
       "ROS 2 itself is not needed. More: docs/guide/inputs.md");
 
+  // Recording and address
   command->add_option("INPUT", request->input, "A recording, as for plumbline map")->required();
   command->add_option("ADDRESS", request->address, "ros2://DOMAIN[?interface=IF&peers=HOST,...]")->required();
   command
@@ -76,6 +80,7 @@ void add_play(CLI::App& app, Session& session) {
       ->type_name("HZ")
       ->check(CLI::Range(0.01, 1000.0));
 
+  // Repetition and the first subscriber
   command->add_flag("--loop", request->play.loop,
                     "Start again after the last frame, until Ctrl-C; stamps continue");
   command
@@ -84,11 +89,11 @@ void add_play(CLI::App& app, Session& session) {
       ->type_name("S")
       ->check(CLI::NonNegativeNumber);
 
+  // Layout and camera of the recording
   command->add_option("--camera", request->open.camera, "Shipped calibration or file")
       ->type_name("NAME|FILE");
   command->add_option("--format", request->open.format, "Layout of INPUT (default: auto)")
       ->check(CLI::IsMember(dataset::layout_names()));
-
   add_topic_option(*command, request->open);
   add_time_range(*command, request->open);
   command->add_option("--every", request->open.every, "Use every N-th frame")

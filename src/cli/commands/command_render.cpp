@@ -78,6 +78,7 @@ core::Result<std::optional<maps::MapPlace>> map_of(const fs::path& input, const 
 }
 
 core::Result<void> add_paths(const maps::MapPlace& place, bool lines, viz::Scene& scene) {
+  // Paths of all robots
   std::vector<maps::LineSegment3> segments;
   for (const fs::path& folder : place.result ? place.result->robot_folders() : std::vector<fs::path>{}) {
     auto trajectory = dataset::read_trajectory(folder / "trajectory.txt");
@@ -85,6 +86,7 @@ core::Result<void> add_paths(const maps::MapPlace& place, bool lines, viz::Scene
     scene.paths.emplace_back().trajectory = std::move(*trajectory);
   }
 
+  // Lines from the result's file
   std::error_code ec;
   const bool has_lines = place.result && (fs::exists(place.result->lines(), ec) || place.store.empty());
   if (lines && has_lines) {
@@ -93,6 +95,7 @@ core::Result<void> add_paths(const maps::MapPlace& place, bool lines, viz::Scene
     segments = std::move(*read);
   }
 
+  // Else from the store
   if (!place.result || (lines && !has_lines)) {
     const auto stored = maps::StoredRun::open_main(place);
     if (!stored) return tl::unexpected<core::Error>(stored.error());
@@ -100,6 +103,7 @@ core::Result<void> add_paths(const maps::MapPlace& place, bool lines, viz::Scene
     if (lines) segments = stored->lines();
   }
 
+  // Lines are drawn as segments
   for (const auto& [a, b] : segments) scene.segments.push_back({a, b});
   return {};
 }
@@ -107,12 +111,14 @@ core::Result<void> add_paths(const maps::MapPlace& place, bool lines, viz::Scene
 /// Adds one value per point, for the colour mode.
 core::Result<void> add_scalars(const cloud::CloudFile& file, const fs::path& input, viz::ColorMode mode,
                                viz::Scene& scene) {
+  // The mode needs a column of the cloud
   const auto missing = [&](const char* what, const char* why = "") {
     return core::usage_error(
         fmt::format("--color {}: {} has no {} of its points{}; choose rgb, height or normal",
                     viz::color_mode_name(mode), input.string(), what, why));
   };
 
+  // Values by mode
   if (mode == viz::ColorMode::kConfidence) {
     if (file.columns.confidence.empty()) return missing("confidence");
     scene.scalars = file.columns.confidence;
@@ -136,7 +142,6 @@ core::Result<void> add_scalars(const cloud::CloudFile& file, const fs::path& inp
     scene.scalars = *errors;
     scene.scalar_label = "error (m)";
   }
-
   return {};
 }
 
@@ -155,10 +160,13 @@ core::Result<void> check_ending(const RenderRequest& request) {
 
 /// All round: a folder of pictures, or a film of them.
 core::Result<void> turn(const RenderRequest& request, const viz::Scene& scene, Console& console) {
+  // A film is made of pictures
   constexpr int kPicturesPerSecond = 15;
   const bool film = is_film(request.output);
   fs::path folder = request.output;
   if (film) folder += ".pictures";
+
+  // Foreign pictures must not be removed
   std::error_code ignored;
   if (film && fs::exists(folder, ignored)) {
     return core::usage_error(
@@ -166,6 +174,7 @@ core::Result<void> turn(const RenderRequest& request, const viz::Scene& scene, C
                     folder.string()));
   }
 
+  // The pictures of a film are removed again
   auto drawn =
       viz::render_turntable(scene, request.options, request.turntable, folder, console.counting("pictures"));
   console.end_progress();
@@ -176,6 +185,7 @@ core::Result<void> turn(const RenderRequest& request, const viz::Scene& scene, C
 }
 
 core::Result<void> render(RenderRequest& request, Session& session) {
+  // Options that contradict each other
   if (auto applied = request.flags.apply(); !applied) return applied;
   if (!request.size.empty()) {
     const std::set<std::string> given = request.flags.given();
@@ -186,9 +196,9 @@ core::Result<void> render(RenderRequest& request, Session& session) {
   if (auto checked = check_ending(request); !checked) return checked;
   if (auto free = maps::check_output(request.output, {request.input}); !free) return free;
 
+  // A cloud file or a map
   const auto found = map_of(request.input, request.robot);
   if (!found) return tl::unexpected<core::Error>(found.error());
-
   const std::optional<maps::MapPlace>& place = *found;
   std::error_code ec;
   const bool cloud_file = fs::is_regular_file(request.input, ec) && request.input.extension() != ".db";
@@ -196,6 +206,7 @@ core::Result<void> render(RenderRequest& request, Session& session) {
                                : maps::read_map_cloud(*place, session.executor());
   if (!file) return tl::unexpected<core::Error>(file.error());
 
+  // Empty clouds still give a picture
   if (file->cloud->empty()) {
     session.console().warning(fmt::format("{}: the {} has no points", request.input.string(),
                                           cloud_file ? "cloud" : "map's cloud"));
@@ -205,24 +216,26 @@ core::Result<void> render(RenderRequest& request, Session& session) {
   scene.cloud = file->cloud;
   scene.title = display_name(place && place->result ? place->result->folder : request.input);
 
+  // Paths and lines of the map
   if (place) {
     if (auto added = add_paths(*place, request.lines, scene); !added) return added;
   } else if (request.lines) {
     return core::usage_error("--lines: only a result folder has lines");
   }
 
+  // Colours and the upward direction
   const fs::path colours = cloud_file || !place->result ? request.input : place->result->ply();
   if (auto added = add_scalars(*file, colours, request.options.color, scene); !added) return added;
   const cloud::CloudFrame frame = cloud_file ? maps::frame_of_cloud(request.input, file->frame) : file->frame;
   if (frame.up() == cloud::Up::kZ) request.options.up = Eigen::Vector3d::UnitZ();
   if (request.turntable > 0) return turn(request, scene, session.console());
-
   return viz::render_snapshot(scene, request.options, request.output);
 }
 
 }  // namespace
 
 void add_render(CLI::App& app, Session& session) {
+  // Input and output
   const auto request = std::make_shared<RenderRequest>();
   CLI::App* command = add_command(app, session, "render", "Draw a map or cloud; needs no display",
                                   [&session, request] { return render(*request, session); });
@@ -238,6 +251,7 @@ void add_render(CLI::App& app, Session& session) {
       ->type_name("NAME");
   command->add_option("--size", request->size, "Size of the picture, like 1600x1200")->type_name("WxH");
 
+  // Several pictures, lines and views
   command
       ->add_option("--turntable", request->turntable,
                    "Number of pictures from all sides, written to a folder, or as .gif or .mp4 with ffmpeg")

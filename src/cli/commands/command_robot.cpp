@@ -13,6 +13,7 @@
 namespace plumbline::cli {
 namespace {
 
+/// The summary, and the state of the delivery.
 int finish(Session& session, const core::Result<net::RobotOutcome>& outcome,
            const std::filesystem::path& folder) {
   if (!outcome) return session.fail(outcome.error());
@@ -26,6 +27,7 @@ int finish(Session& session, const core::Result<net::RobotOutcome>& outcome,
 }
 
 int robot(Session& session, net::RobotRequest request, const PublishRequest& publish) {
+  // The robot's identity and its output
   if (auto equipped = session.equip(request.map); !equipped) return session.fail(equipped.error());
   prepare_live(request.map);
   if (auto prepared =
@@ -36,6 +38,7 @@ int robot(Session& session, net::RobotRequest request, const PublishRequest& pub
   request.hand_in = fmt::format("--name {}{}", request.name, network_arguments(request.network));
   if (request.map.output.empty()) request.map.output = request.name;
 
+  // An earlier run only needs to be sent
   const core::StopToken& stop = stop_on_signals();
   Console& console = session.console();
   const auto status = [&](const std::string& line) { console.status(line); };
@@ -46,12 +49,14 @@ int robot(Session& session, net::RobotRequest request, const PublishRequest& pub
     if (*finished) earlier = request.map.output;
   }
 
+  // Only transmission is left to do
   if (!earlier.empty()) {
     const auto outcome = net::hand_in(request, earlier, console, stop, status);
     console.end_progress();
     return finish(session, outcome, earlier);
   }
 
+  // Mapping and sending
   const auto outcome =
       net::run_robot(request, session.executor(), console, stop, status, console.counting("frames"));
   console.end_progress();
@@ -61,10 +66,12 @@ int robot(Session& session, net::RobotRequest request, const PublishRequest& pub
 }  // namespace
 
 void add_robot(CLI::App& app, Session& session) {
+  // Shared by the command and its options
   const auto request = std::make_shared<net::RobotRequest>();
   request->map.pipeline = "robot";
   const auto publish = std::make_shared<PublishRequest>();
 
+  // The command and how two terminals use it
   CLI::App* command =
       add_command(app, session, "robot", "Map a recording and send the map to a hub meanwhile",
                   [&session, request, publish] { return robot(session, *request, *publish); });
@@ -74,6 +81,7 @@ void add_robot(CLI::App& app, Session& session) {
       "or once more:       plumbline robot r0 --name r0 --interface lo   (sends the map in folder r0)\n"
       "Exit code 4: a hub has answered, but not received everything. More: docs/guide/network.md");
 
+  // Input, name and output
   command
       ->add_option("INPUT", request->map.input,
                    "Recording, as for plumbline map; or the result folder of an earlier run, to send its map")
@@ -84,6 +92,7 @@ void add_robot(CLI::App& app, Session& session) {
   command->add_option("-o,--output", request->map.output, "Folder for the result (default: NAME)")
       ->type_name("OUT");
 
+  // Network, frames and feedback
   add_network_options(*command, request->network);
   add_frames_options(*command, *publish);
   command
@@ -93,6 +102,7 @@ void add_robot(CLI::App& app, Session& session) {
           "(default: off)")
       ->check(CLI::IsMember({"off", "on"}));
 
+  // Waiting times for the hub
   command
       ->add_option("--wait", request->wait_s,
                    "Seconds to wait after the last frame for a hub to answer at all (default: 30)")

@@ -24,28 +24,29 @@ struct SynthRequest {
 };
 
 core::Result<void> film(SynthRequest& request, Session& session) {
+  // Options and scene
   if (auto applied = request.flags.apply(); !applied) return applied;
   if (auto checked = synth::check(request.options); !checked) return checked;
-
   const auto pipelines = session.pipelines_folder();
   if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
   const auto scene = synth::open_scene(request.scene, request.options, *pipelines / "scenes");
-
   if (!scene) return tl::unexpected<core::Error>(scene.error());
 
+  // Recordings are never overwritten
   std::error_code ec;
   if (std::filesystem::exists(request.output, ec) && !std::filesystem::is_empty(request.output, ec)) {
     return core::usage_error(
         fmt::format("{}: exists and is not empty; name a new folder", request.output.string()));
   }
 
+  // Cameras film the scene
   Console& console = session.console();
-  const auto summary = synth::write_recordings(*scene, request.options, request.output, session.executor(),
+  const auto summary = synth::write_recordings({*scene, request.options, request.output}, session.executor(),
                                                stop_on_signals(), console, console.counting("frames"));
   console.end_progress();
-
   if (!summary) return tl::unexpected<core::Error>(summary.error());
 
+  // Coverage by the cameras
   if (!session.quiet) {
     if (summary->openings > 0) {
       print("the cameras saw {:.0f} % of all surface, and the jambs of {} of {} openings\n",
@@ -58,12 +59,12 @@ core::Result<void> film(SynthRequest& request, Session& session) {
           summary->stopped ? "stopped early: " : "", summary->robots, summary->frames, summary->path_m,
           summary->reference_samples, request.output.string());
   }
-
   return {};
 }
 
 }  // namespace
 
+/// Options of synth.
 void add_synth(CLI::App& app, Session& session) {
   const auto request = std::make_shared<SynthRequest>();
   CLI::App* command =

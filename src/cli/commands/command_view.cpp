@@ -25,6 +25,7 @@ struct ViewCommand {
 };
 
 core::Result<void> run_view(ViewCommand& command, Session& session) {
+  // The address must be free before the long work
   const auto options = net::page_server_options(command.http, command.token);
   if (!options) return tl::unexpected<core::Error>(options.error());
   if (auto free = net::check_listening(*options); !free) return free;
@@ -34,6 +35,7 @@ core::Result<void> run_view(ViewCommand& command, Session& session) {
   exports::ExportRequest other = command.request;
   other.input = command.other;
 
+  // One result, or two in one view
   auto view = command.other.empty()
                   ? exports::view_of(command.request, session.executor(), console, console.counting("views"))
                   : exports::view_of_two(command.request, other, session.executor(), console,
@@ -50,6 +52,7 @@ core::Result<void> run_view(ViewCommand& command, Session& session) {
   sigaddset(&ends, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &ends, nullptr);
 
+  // The page is served until a signal
   auto server = net::PageServer::start(*options, viewer::page(view->scene, exports::kViewGenerator));
   if (!server) return tl::unexpected<core::Error>(server.error());
   print("{}\n", server->address());
@@ -79,6 +82,7 @@ void add_view(CLI::App& app, Session& session) {
                    "Token that every browser must present; it is part of the address that is printed")
       ->type_name("TEXT");
 
+  // Points of the map
   command
       ->add_option("--points", state->request.options.points,
                    "Largest number of points, thinned by voxels; 0: all (default: 1500000)")

@@ -7,6 +7,7 @@
 namespace plumbline::cli {
 namespace {
 
+/// Parts between separators; empty ones count.
 std::vector<std::string> split(const std::string& text, char at) {
   std::vector<std::string> parts;
   for (std::size_t begin = 0; begin <= text.size();) {
@@ -37,6 +38,7 @@ std::vector<std::string> choices_in(const std::string& type) {
   return split(type.substr(open + 1, type.find('}', open) - open - 1), ',');
 }
 
+/// Flags, value and choices of an option.
 ArgumentReference argument_reference(const CLI::Option& option) {
   ArgumentReference argument;
   for (const std::string& name : option.get_snames()) argument.flags.push_back("-" + name);
@@ -76,6 +78,7 @@ const CommandReference* CommandReference::find(const std::string& word) const {
   return found == commands.end() ? nullptr : &*found;
 }
 
+/// The command with all that it contains.
 CommandReference command_reference(const CLI::App& app) {
   CommandReference reference;
   for (const CLI::App* a = &app; a->get_parent() != nullptr; a = a->get_parent())

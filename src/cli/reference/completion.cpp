@@ -47,6 +47,7 @@ class Line {
     for (std::size_t i = 0; i + 1 < words.size(); ++i) read(words[i]);
   }
 
+  /// Candidates for the word under the cursor.
   Completion complete() {
     if (waiting_ != nullptr) return values_of(*waiting_, "", typed_);
     const std::size_t equals = typed_.find('=');
@@ -78,6 +79,7 @@ class Line {
     }
   }
 
+  /// The value follows the equals sign, or is the next word.
   void read_flag(const std::string& word) {
     const std::size_t equals = word.find('=');
     const ArgumentReference* argument = flag(word.substr(0, equals));
@@ -119,6 +121,7 @@ class Line {
     return completion;
   }
 
+  /// Flags that may still be given.
   [[nodiscard]] Completion flags() const {
     Completion completion;
     for (const ArgumentReference& argument : command_->arguments) {
@@ -130,6 +133,7 @@ class Line {
 
   [[nodiscard]] Completion values_of(const ArgumentReference& argument, const std::string& start,
                                      const std::string& value) const {
+    // Settings and robots depend on earlier words
     Completion completion;
     const std::string& name = argument.positional() ? argument.name : argument.value;
     if (name == "stage.key=value") return settings(start, value);
@@ -138,14 +142,18 @@ class Line {
       return completion;
     }
 
+    // Choices are known completely
     for (const std::string& choice : argument.choices) add(completion, start, choice, "");
     if (!argument.choices.empty()) return completion;
+
+    // Names of shipped files and types
     const ValueKind kind = kind_of(argument, name);
     if (kind.names) {
       for (const Candidate& known : source_.names(*kind.names))
         add(completion, start, known.word, known.help);
     }
 
+    // Generated scenes are an input too
     if (name == "INPUT" && begins_with(value, "s")) {
       for (const Candidate& scene : source_.names(Kind::kScenes))
         add(completion, start + "synth:", scene.word, "a generated world, filmed while mapping");
@@ -207,10 +215,12 @@ Completion complete(const CommandReference& program, const std::vector<std::stri
 }
 
 std::vector<std::string> shell_words(const std::string& line) {
+  // Quotes join words
   std::vector<std::string> words{""};
   char quote = 0;
   bool begun = false;
 
+  // Blanks outside quotes end a word
   for (std::size_t i = 0; i < line.size(); ++i) {
     const char c = line[i];
     if (quote == 0 && (c == ' ' || c == '\t')) {
@@ -219,7 +229,9 @@ std::vector<std::string> shell_words(const std::string& line) {
       continue;
     }
 
+    // Empty quotes are a word, too
     begun = true;
+
     if (c == '\\' && quote != '\'' && i + 1 < line.size()) {
       words.back() += line[++i];
     } else if (quote == 0 && (c == '\'' || c == '"')) {

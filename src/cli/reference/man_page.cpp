@@ -47,6 +47,7 @@ std::string heading(const ArgumentReference& argument) {
   return argument.value.empty() ? text : text + " " + italic(argument.value);
 }
 
+/// Required flags, then positional arguments.
 std::string synopsis(const CommandReference& command) {
   std::string text = ".B " + plain(command.name(" ")) + "\n";
   for (const ArgumentReference& argument : command.arguments) {
@@ -63,6 +64,7 @@ std::string synopsis(const CommandReference& command) {
   return text;
 }
 
+/// One section of arguments, with their choices.
 std::string arguments(const CommandReference& command, bool positional, const char* title) {
   std::string text;
   for (const ArgumentReference& argument : command.arguments) {
@@ -85,6 +87,7 @@ std::string commands(const CommandReference& command) {
   return text;
 }
 
+/// The page of the program and of the command's group.
 std::string see_also(const CommandReference& command, const CommandReference& program) {
   std::string text = ".SH SEE ALSO\n";
   if (command.words.empty())
@@ -96,6 +99,7 @@ std::string see_also(const CommandReference& command, const CommandReference& pr
 
 }  // namespace
 
+/// Sections in the order of man-pages(7).
 std::string man_page(const CommandReference& command, const CommandReference& program) {
   const std::string name = command.name("-");
   std::string page =

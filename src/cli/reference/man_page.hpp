@@ -7,8 +7,8 @@
 
 namespace plumbline::cli {
 
-/// The manual page of a command, section 1, in the language of man(7). `program` is the whole program, to
-/// which others are pointed to.
+/// The manual page of a command, section 1, in the language of man(7). `program`: the whole program, to which
+/// the pages of its commands refer.
 std::string man_page(const CommandReference& command, const CommandReference& program);
 
 }  // namespace plumbline::cli

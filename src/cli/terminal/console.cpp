@@ -69,6 +69,7 @@ void Console::write(core::LogLevel level, const std::string& message) {
   put(fmt::format("plumbline: {}{}\n", label(level), core::printable(message)));
 }
 
+/// Several problems are counted.
 void Console::problems(const core::Error& error) {
   const std::lock_guard<std::mutex> lock(mutex_);
   clear_bar();
@@ -81,6 +82,7 @@ void Console::problems(const core::Error& error) {
 }
 
 void Console::progress(std::size_t done, std::size_t total, const char* what) {
+  // Started with the first call
   if (quiet_) return;
   const std::lock_guard<std::mutex> lock(mutex_);
   const auto now = Clock::now();
@@ -89,6 +91,7 @@ void Console::progress(std::size_t done, std::size_t total, const char* what) {
     start_ = last_ = now;
   }
 
+  // Terminals change often, logs rarely
   const double since_last_s = std::chrono::duration<double>(now - last_).count();
   const double every_s = terminal_                        ? kBarEvery_s
                          : style_ == ProgressStyle::kJson ? kObjectEvery_s
@@ -97,6 +100,7 @@ void Console::progress(std::size_t done, std::size_t total, const char* what) {
   last_ = now;
   const double elapsed_s = std::chrono::duration<double>(now - start_).count();
 
+  // A bar, a count or a line
   if (terminal_) {
     clear_bar();
     draw_bar(done, total, what, elapsed_s);
@@ -108,6 +112,7 @@ void Console::progress(std::size_t done, std::size_t total, const char* what) {
   }
 }
 
+/// A line for logs, or an object for programs.
 void Console::put_line(std::size_t done, std::size_t total, const char* what, double elapsed_s) const {
   const double rate = rate_of(done, elapsed_s);
   const double left_s = rate > 0.0 && total > 0 ? static_cast<double>(total - done) / rate : 0.0;
@@ -123,6 +128,7 @@ void Console::put_line(std::size_t done, std::size_t total, const char* what, do
                   rate_text(done, what, elapsed_s), clock_text(left_s), note_));
 }
 
+/// The name of a step after the last frame.
 void Console::step(const std::string& name) {
   if (quiet_) return;
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -139,6 +145,7 @@ void Console::step(const std::string& name) {
   }
 }
 
+/// A line that replaces the last one on a terminal.
 void Console::status(const std::string& line) {
   if (quiet_) return;
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -156,6 +163,7 @@ void Console::status(const std::string& line) {
   bar_shown_ = terminal_;
 }
 
+/// A bar with speed and time left.
 void Console::draw_bar(std::size_t done, std::size_t total, const char* what, double elapsed_s) const {
   if (total == 0) {
     put(fmt::format("{}  {}{}", counted(done, what, elapsed_s), clock_text(elapsed_s), note_));

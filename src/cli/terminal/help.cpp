@@ -56,6 +56,7 @@ std::string plain_error(const std::string& text) {
                             "'$1' is too small, or not a number");
 }
 
+/// A suggestion for a flag that does not exist.
 std::string option_problem(const CLI::App& command, const std::string& word) {
   const std::string flag = word.substr(0, word.find('='));
   std::vector<std::string> names;
@@ -81,16 +82,19 @@ std::string PlainHelp::make_option_opts(const CLI::Option* option) const {
 }
 
 std::string usage_problem(const CLI::App& app, const CLI::ParseError& error) {
+  // The command that was reached
   const CLI::App* command = &app;
   while (!command->get_subcommands().empty()) command = command->get_subcommands().back();
   const std::string help = " (see " + full_name(*command) + " --help)";
 
+  // The first unknown word
   const CLI::App* asked = command;  // the one that was given words it does not know
   while (asked->remaining().empty() && asked->get_parent() != nullptr) asked = asked->get_parent();
   const std::vector<std::string> words = asked->remaining();
   const auto flag = std::find_if(words.begin(), words.end(), is_flag);
   const auto word = std::find_if_not(words.begin(), words.end(), is_flag);
 
+  // A missing command comes before unknown flags
   const int code = error.get_exit_code();
   const bool unknown = code == static_cast<int>(CLI::ExitCodes::ExtrasError);
   const bool missing = code == static_cast<int>(CLI::ExitCodes::RequiredError);
@@ -99,6 +103,7 @@ std::string usage_problem(const CLI::App& app, const CLI::ParseError& error) {
     if (flag == words.end()) return "a command is required" + help;
   }
 
+  // Unknown flags and words
   if ((unknown || missing) && flag != words.end()) return option_problem(*asked, *flag) + help;
   if (unknown && word != words.end()) return fmt::format("'{}' is one argument too many{}", *word, help);
   return plain_error(error.what()) + help;

@@ -12,6 +12,7 @@ namespace {
 // A signal handler can only reach static objects.
 const core::StopToken* stop_token = nullptr;
 
+/// The first signal asks to stop, the second ends the program.
 void on_signal(int signal) {
   if (stop_token->stop_requested()) {
     std::signal(signal, SIG_DFL);

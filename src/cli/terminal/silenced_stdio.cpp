@@ -24,6 +24,7 @@ void restore(int saved, int stream) {
 
 }  // namespace
 
+/// Output of other libraries goes nowhere until the destructor.
 SilencedStdio::SilencedStdio() {
   flush_all();
   out_ = dup(STDOUT_FILENO);

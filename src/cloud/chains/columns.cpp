@@ -22,6 +22,7 @@ bool before_in_order(const Point& a, const Point& b) {
 }
 bool same_place(const Point& a, const Point& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
+// The values at the given indices; an empty column stays empty.
 template <typename T>
 std::vector<T> picked(const std::vector<T>& column, const std::vector<std::size_t>& indices) {
   std::vector<T> result;
@@ -70,6 +71,7 @@ std::vector<std::size_t> find_all(const Cloud& before, const Cloud& after) {
   }
   if (found.size() == after.size()) return found;
 
+  // Otherwise by search among the sorted points
   std::vector<std::size_t> order = finite_indices(before);  // NaN has no order
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return before_in_order(before[a], before[b]); });
@@ -110,6 +112,7 @@ std::vector<std::size_t> nearest(const Cloud& before, const Cloud& after) {
 
 }  // namespace
 
+// The rows at the given indices, in all columns.
 CloudColumns pick_columns(const CloudColumns& columns, const std::vector<std::size_t>& indices) {
   CloudColumns result;
   result.confidence = picked(columns.confidence, indices);
@@ -126,6 +129,7 @@ void append_columns(CloudColumns& columns, std::size_t size, const CloudColumns&
   append(columns.observations, size, more.observations, added);
   append(columns.robot, size, more.robot, added);
 
+  // Columns that one side lacks are 0 there
   for (auto& other : columns.others) other.values.resize(size + added);
   for (const auto& other : more.others) {
     auto known = std::find_if(columns.others.begin(), columns.others.end(),
@@ -142,8 +146,11 @@ void append_columns(CloudColumns& columns, std::size_t size, const CloudColumns&
 CloudColumns carry_columns(const Cloud& before, const CloudColumns& columns, const Cloud& after) {
   if (columns.empty()) return {};
   if (same_places(before, after)) return columns;
+
+  // A filter that only chose points keeps their rows
   std::vector<std::size_t> indices = find_all(before, after);
   if (indices.size() != after.size()) {
+    // Moved points: by order, else by the nearest
     if (before.size() == after.size()) return columns;
     indices = finite_indices(before);
     if (indices.size() != after.size()) indices = nearest(before, after);

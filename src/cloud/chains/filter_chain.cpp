@@ -51,12 +51,14 @@ const FilterInfo* find_type(const ConfigNode& entry, const std::string& path, co
     return nullptr;
   }
 
+  // Every filter names its type
   const ConfigNode* type = entry.find("type");
   if (type == nullptr) {
     problems.push_back({entry.mark, path, "has no type" + core::hint("", registry.types())});
     return nullptr;
   }
 
+  // The type must be registered
   const FilterInfo* info = registry.find(type->scalar);
   if (info == nullptr || type->kind != ConfigNode::Kind::kScalar) {
     problems.push_back({type->mark, path + ".type",
@@ -82,8 +84,9 @@ FilterChain FilterChain::parse(const ConfigNode& node, const std::string& path,
 
   refuse_unknown_keys(node, path, {"chain", "description", "filters"}, problems);
   const std::string prefix = path.empty() ? "" : path + ".";
-  const ConfigNode* name = node.find("chain");
 
+  // The name, of permitted characters only
+  const ConfigNode* name = node.find("chain");
   if (name == nullptr || name->kind != ConfigNode::Kind::kScalar || name->scalar.empty()) {
     problems.push_back(
         {name == nullptr ? node.mark : name->mark, prefix + "chain", "the chain needs a name"});
@@ -93,6 +96,7 @@ FilterChain FilterChain::parse(const ConfigNode& node, const std::string& path,
     chain.name_ = name->scalar;
   }
 
+  // The filters, in the order in which they run
   const ConfigNode* filters = node.find("filters");
   if (filters == nullptr || filters->kind != ConfigNode::Kind::kSequence) {
     problems.push_back(
@@ -116,18 +120,22 @@ FilterChain FilterChain::parse_list(const ConfigNode& list, const std::string& p
     const FilterInfo* info = find_type(entry, place, registry, problems);
     if (info == nullptr) continue;
 
+    // Options from the entry, with all of their problems
     const std::shared_ptr<Filter> filter = info->make();
     core::OptionTable table;
     filter->declare(table);
     const std::size_t before = problems.size();
     table.set_all(entry, place, problems, {"type"});
 
+    // Options may be valid alone but not together
     if (problems.size() == before) {
       const std::string wrong = filter->check();
       if (!wrong.empty()) problems.push_back({entry.mark, place, wrong});
     }
 
     chain.filters_.push_back({info->type, filter, entry_yaml(info->type, table)});
+
+    // Two filters must not write the same file
     if (const std::string file = filter->writes(); !file.empty()) {
       const bool taken = std::find(written.begin(), written.end(), normal(file)) != written.end();
       if (taken) problems.push_back({entry.mark, place, file + " is written by an earlier filter already"});
@@ -142,6 +150,8 @@ core::Result<FilterChain> FilterChain::load(const std::filesystem::path& file,
                                             const FilterRegistry& registry) {
   const auto node = core::read_yaml(file);
   if (!node) return tl::unexpected<core::Error>(node.error());
+
+  // All problems of the file in one error
   ConfigProblems problems;
   FilterChain chain = parse(*node, "", registry, problems);
   if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));
@@ -160,6 +170,7 @@ core::Error FilterChain::at(std::size_t step, const core::Error& error) const {
 }
 
 core::Result<void> FilterChain::ready(const FilterContext& context) const {
+  // The error names the filter's place in the chain
   for (std::size_t i = 0; i < filters_.size(); ++i) {
     if (auto fit = filters_[i].filter->ready(context); !fit) {
       return tl::unexpected<core::Error>(at(i, fit.error()));
@@ -169,6 +180,7 @@ core::Result<void> FilterChain::ready(const FilterContext& context) const {
 }
 
 core::Result<double> FilterChain::reach_m() const {
+  // Each filter widens the border that tiles need
   double sum = 0.0;
   for (std::size_t i = 0; i < filters_.size(); ++i) {
     const auto reach = filters_[i].filter->reach_m();
@@ -210,6 +222,7 @@ core::Result<FusedCloud> FilterChain::run(CloudConstPtr input, CloudColumns colu
     if (progress) progress(i, filters_.size(), step.type);
     output.reset();  // `current` alone holds the input
 
+    // The filter sees the columns of its input
     CloudColumns made;
     context.columns = &columns;
     context.made_columns = &made;
@@ -218,10 +231,13 @@ core::Result<FusedCloud> FilterChain::run(CloudConstPtr input, CloudColumns colu
     const std::chrono::duration<double, std::milli> elapsed = std::chrono::steady_clock::now() - start;
     if (!result) return tl::unexpected<core::Error>(at(i, result.error()));
 
+    // Columns that the filter did not make follow its points
     output = std::move(*result);
     if (made.empty()) made = carry_columns(*current, columns, *output);
     std::swap(columns, made);
     current = output;
+
+    // Remaining points and time, for the report
     const std::size_t left = count_finite(*current);
     if (reports != nullptr) reports->push_back({step.type, points, left, elapsed.count()});
     points = left;
@@ -235,6 +251,7 @@ core::Result<FusedCloud> FilterChain::run(CloudConstPtr input, CloudColumns colu
 core::Result<CloudPtr> FilterChain::apply(CloudConstPtr input, const FilterContext& context,
                                           std::vector<FilterReport>* reports,
                                           const ChainProgress& progress) const {
+  // Columns only if the caller also takes them back
   const bool columned = context.columns != nullptr && context.made_columns != nullptr;
   auto filtered =
       run(std::move(input), columned ? *context.columns : CloudColumns(), context, reports, progress);

@@ -51,6 +51,7 @@ std::string check_fit(const FilterPlugin* plugin) {
 }
 
 std::string add_filters(const FilterPlugin& plugin, FilterRegistry& registry) {
+  // A copy: a plugin that fails leaves the registry as it was
   FilterRegistry more = registry;
   try {
     plugin.add(more);
@@ -70,6 +71,8 @@ core::Result<void> load_filter_plugin(const std::filesystem::path& file, FilterR
   };
   const auto entry = open_plugin(file);
   if (!entry) return fail(entry.error().message);
+
+  // Nothing of a plugin for another version is called
   const FilterPlugin* plugin = (*entry)();
   std::string problem = check_fit(plugin);
   if (problem.empty()) problem = add_filters(*plugin, registry);

@@ -7,6 +7,7 @@
 namespace plumbline::cloud {
 
 void FilterRegistry::add(FilterInfo info) {
+  // Sorted by name, which must be unique
   const auto place =
       std::lower_bound(filters_.begin(), filters_.end(), info.type,
                        [](const FilterInfo& f, const std::string& type) { return f.type < type; });

@@ -16,6 +16,7 @@ Json filter_schema(const FilterInfo& info) {
   core::OptionTable table;
   filter->declare(table);
 
+  // The type is fixed; everything else is an option
   Json properties;
   properties["type"] = {{"const", info.type}};
   properties.update(core::options_schema(table.specs()));

@@ -42,6 +42,7 @@ constexpr const char* kIntroduction =
     "more than 10 km apart are refused, since floats cannot hold both. A chain that\n"
     "leaves no point ends with exit code 4 and names the filter that removed the last one.\n";
 
+// The values that an option accepts, for the table.
 std::string allowed(const core::OptionSpec& option) {
   if (!option.choices.empty()) return fmt::format("{}", fmt::join(option.choices, ", "));
   switch (option.type) {
@@ -57,6 +58,7 @@ std::string allowed(const core::OptionSpec& option) {
   }
 }
 
+// A filter's section: summary, details, example and table of options.
 std::string entry(const FilterInfo& info) {
   std::string text = fmt::format(
       "\n## {0}\n\n{1}\n\n![{0}: before and after](pictures/{0}.png)\n\n{2} "

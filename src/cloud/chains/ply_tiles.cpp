@@ -36,6 +36,7 @@ core::Result<void> PlyTiles::take_layout(const std::filesystem::path& file, cons
     return refused(
         "is a text file; tiles need binary PLY: write it as one with a chain without filters first");
 
+  // Only points, since tiles would cut a mesh
   if (header.elements.empty() || header.elements.front().name != "vertex")
     return refused("does not begin with points");
   for (std::size_t i = 1; i < header.elements.size(); ++i) {
@@ -47,6 +48,7 @@ core::Result<void> PlyTiles::take_layout(const std::filesystem::path& file, cons
     return a.name == b.name && a.type == b.type;
   };
 
+  // Properties must be those of the first file
   if (record_size_ > 0) {
     const bool fits = header.format == format_ && std::equal(properties.begin(), properties.end(),
                                                              properties_.begin(), properties_.end(), same);
@@ -54,7 +56,7 @@ core::Result<void> PlyTiles::take_layout(const std::filesystem::path& file, cons
                 : refused("has other properties than the first cloud; filter it by itself");
   }
 
-  // Where x, y and z are in a record.
+  // Offsets of x, y and z within a record.
   int found = 0;
   for (const PlyProperty& property : properties) {
     if (property.list)
@@ -78,17 +80,20 @@ core::Result<void> PlyTiles::take_layout(const std::filesystem::path& file, cons
 core::Result<void> PlyTiles::add(const std::filesystem::path& file) {
   ByteReader reader(file);
   if (!reader.open()) return core::input_error(file.string() + ": does not exist, or cannot be read");
-  const auto header = read_ply_header(reader);
 
+  // All files must have the same properties
+  const auto header = read_ply_header(reader);
   if (!header) return core::input_error(file.string() + ": " + header.error().message);
   if (auto fits = take_layout(file, *header); !fits) return fits;
 
+  // A truncated file is refused before its points are read
   const std::uint64_t count = header->elements.front().count;
   if (count > reader.remaining() / record_size_) {
     return core::input_error(fmt::format("{}: is truncated: {} points are promised, {} are there",
                                          file.string(), count, reader.remaining() / record_size_));
   }
 
+  // Every file's points, some of the first's as a sample
   const bool first = points_ == 0;
   const std::uint64_t sampled = std::max<std::uint64_t>(1, count / 1000);
   for (std::uint64_t i = 0; i < count; ++i) {
@@ -97,12 +102,14 @@ core::Result<void> PlyTiles::add(const std::filesystem::path& file) {
     if (first && i % sampled == 0) sample(record);
     put(record);
 
+    // Each tile is a file
     if (tiles_.size() > kMostTiles) {
       return core::usage_error(
           fmt::format("{}: more than {} tiles of {:g} m; use larger ones, or remove far points first",
                       file.string(), kMostTiles, tile_m_));
     }
 
+    // Points wait in memory and are written together
     if (waiting_ < kMostWaiting) continue;
     if (auto written = write_waiting(); !written) return written;
   }
@@ -145,6 +152,8 @@ void PlyTiles::put(const std::uint8_t* record) {
 core::Result<void> PlyTiles::write_waiting() {
   for (auto& [key, tile] : tiles_) {
     if (tile.waiting.empty()) continue;
+
+    // The header of a new tile is completed in the end
     const std::filesystem::path file = file_of(key);
     std::error_code error;
     const bool begun = std::filesystem::exists(file, error);
@@ -162,6 +171,8 @@ core::Result<void> PlyTiles::write_waiting() {
 
 core::Result<void> PlyTiles::finish() {
   if (auto written = write_waiting(); !written) return written;
+
+  // Only now are the numbers of points known
   for (const auto& [key, tile] : tiles_) {
     std::fstream out(file_of(key), std::ios::binary | std::ios::in | std::ios::out);
     out << header(tile.points);

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder beside the output that is gone when this is.
+/// A folder next to the output, removed together with this object.
 class TileFolder {
  public:
   explicit TileFolder(const fs::path& output)
@@ -78,6 +78,7 @@ core::Result<void> join(const std::vector<fs::path>& pieces, std::size_t points,
     const std::size_t count = header.find("element vertex ");
     const std::size_t behind = header.find('\n', count);
 
+    // The first piece's header, with the points of all
     if (properties.empty()) {
       properties = header.substr(behind);
       out.write(header.substr(0, count) + fmt::format("element vertex {}", points) + properties);
@@ -85,6 +86,7 @@ core::Result<void> join(const std::vector<fs::path>& pieces, std::size_t points,
       return core::usage_error("the chain gives tiles different properties; run it without --tiles");
     }
 
+    // The points follow unchanged, block by block
     constexpr std::uint64_t kBlock = 1 << 18;
     while (reader.remaining() > 0) {
       const auto size = static_cast<std::size_t>(std::min(kBlock, reader.remaining()));
@@ -97,6 +99,59 @@ core::Result<void> join(const std::vector<fs::path>& pieces, std::size_t points,
   return out.commit();
 }
 
+/// How far around a tile points decide about its own, metres.
+core::Result<double> margin_of(const FilterChain& chain, double tile_m) {
+  const auto reach = chain.reach_m();
+  if (!reach) return tl::unexpected(reach.error());
+
+  // Small tiles would be mostly margin
+  constexpr double kRounding_m = 0.001;
+  const double margin_m = *reach + kRounding_m;
+  if (tile_m < 4.0 * margin_m) {
+    return core::usage_error(fmt::format(
+        "tiles of {:g} m are too small for chain {}, whose filters look {:g} m far; use {:g} m or more",
+        tile_m, chain.name(), *reach, 4.0 * margin_m));
+  }
+  return margin_m;
+}
+
+/// Every point into the files of its tiles.
+core::Result<void> cut_into_tiles(const std::vector<fs::path>& inputs, PlyTiles& tiles) {
+  for (const fs::path& input : inputs) {
+    if (core::ending_of(input) != ".ply")
+      return core::input_error(input.string() + ": tiles are cut from binary PLY files");
+    if (auto added = tiles.add(input); !added) return tl::unexpected(added.error());
+  }
+  return tiles.finish();
+}
+
+struct FilteredTile {
+  CloudPtr cloud;
+  CloudColumns columns;
+};
+
+/// The chain on a tile with its margin, of which the tile is kept. Removes the tile's file.
+core::Result<FilteredTile> filter_tile(const FilterChain& chain, const fs::path& file, const TileKey& key,
+                                       double tile_m, FilterContext context) {
+  auto tile = read_cloud(file, LargeCoordinates::kShifted);
+  if (!tile) return tl::unexpected(tile.error());
+  change_shift(*tile->cloud, tile->shift, context.shift);
+
+  // Points made by filters get columns of their own
+  FilteredTile made;
+  context.columns = &tile->columns;
+  context.made_columns = &made.columns;
+  auto filtered = chain.apply(std::move(tile->cloud), context);
+  if (!filtered) return tl::unexpected(filtered.error());
+  made.cloud = std::move(*filtered);
+  keep_own(*made.cloud, made.columns, context.shift, key, tile_m);
+
+  // The disk holds a tile only once
+  std::error_code ignored;
+  fs::remove(file, ignored);
+  return made;
+}
+
 }  // namespace
 
 CloudFrame frame_of_ply(const fs::path& file) {
@@ -105,70 +160,46 @@ CloudFrame frame_of_ply(const fs::path& file) {
   return header ? frame_in(header->comments) : CloudFrame();
 }
 
-core::Result<TiledReport> filter_in_tiles(const FilterChain& chain, const std::vector<fs::path>& inputs,
-                                          const fs::path& output, double tile_m, CloudFrame& frame,
-                                          const core::Executor* executor,
+core::Result<TiledReport> filter_in_tiles(const FilterChain& chain, const TiledFiles& files, double tile_m,
+                                          CloudFrame& frame, const core::Executor* executor,
                                           const std::function<void(std::size_t, std::size_t)>& progress) {
-  const auto reach = chain.reach_m();
-  if (!reach) return tl::unexpected(reach.error());
-  constexpr double kRounding_m = 0.001;
-  const double margin_m = *reach + kRounding_m;
-  if (tile_m < 4.0 * margin_m) {
-    return core::usage_error(fmt::format(
-        "tiles of {:g} m are too small for chain {}, whose filters look {:g} m far; use {:g} m or more",
-        tile_m, chain.name(), *reach, 4.0 * margin_m));
-  }
-
-  // Every point into the files of its tiles.
-  const TileFolder folder(output);
+  const auto margin_m = margin_of(chain, tile_m);
+  if (!margin_m) return tl::unexpected(margin_m.error());
+  const TileFolder folder(files.output);
   if (auto made = folder.make(); !made) return tl::unexpected(made.error());
-  PlyTiles tiles(folder.path(), tile_m, margin_m);
-  for (const fs::path& input : inputs) {
-    if (core::ending_of(input) != ".ply")
-      return core::input_error(input.string() + ": tiles are cut from binary PLY files");
-    if (auto added = tiles.add(input); !added) return tl::unexpected(added.error());
-  }
-  if (auto finished = tiles.finish(); !finished) return tl::unexpected(finished.error());
+  PlyTiles tiles(folder.path(), tile_m, *margin_m);
+  if (auto made = cut_into_tiles(files.inputs, tiles); !made) return tl::unexpected(made.error());
 
-  // Tile by tile.
+  // All tiles refer to one shift
   TiledReport report;
   report.points_in = tiles.points();
   const std::vector<TileKey> keys = tiles.keys();
   report.tiles = keys.size();
-  std::vector<fs::path> pieces;
   FilterContext context;
   context.shift = tiles.shift();
   context.executor = executor;
+  context.frame = &frame;
 
+  // Tile by tile, so that memory holds one at a time
+  std::vector<fs::path> pieces;
   for (std::size_t i = 0; i < keys.size(); ++i) {
     if (progress) progress(i, keys.size());
-    const fs::path file = tiles.file_of(keys[i]);
     report.fullest = std::max(report.fullest, tiles.points_of(keys[i]));
-    auto tile = read_cloud(file, LargeCoordinates::kShifted);
+    const auto tile = filter_tile(chain, tiles.file_of(keys[i]), keys[i], tile_m, context);
     if (!tile) return tl::unexpected(tile.error());
-    change_shift(*tile->cloud, tile->shift, context.shift);
 
-    CloudColumns columns = std::move(tile->columns);
-    CloudColumns made;
-    context.columns = &columns;
-    context.made_columns = &made;
-    context.frame = &frame;
-    auto filtered = chain.apply(std::move(tile->cloud), context);
-    if (!filtered) return tl::unexpected(filtered.error());
-    keep_own(**filtered, made, context.shift, keys[i], tile_m);
-
-    std::error_code ignored;
-    fs::remove(file, ignored);
-    if ((*filtered)->empty()) continue;
-    report.points_out += (*filtered)->size();
+    // Empty tiles have no file
+    if (tile->cloud->empty()) continue;
+    report.points_out += tile->cloud->size();
     pieces.push_back(folder.path() / fmt::format("piece{}.ply", i));
-    if (auto written = write_ply(pieces.back(), **filtered, made, context.shift, frame.comments()); !written)
+    if (auto written = write_ply(pieces.back(), *tile->cloud, tile->columns, context.shift, frame.comments());
+        !written)
       return tl::unexpected(written.error());
   }
 
   if (progress) progress(keys.size(), keys.size());
-  const auto written = pieces.empty() ? write_ply(output, Cloud(), {}, context.shift, frame.comments())
-                                      : join(pieces, report.points_out, output);
+  const auto written = pieces.empty() ? write_ply(files.output, Cloud(), {}, context.shift, frame.comments())
+                                      : join(pieces, report.points_out, files.output);
   if (!written) return tl::unexpected(written.error());
   return report;
 }

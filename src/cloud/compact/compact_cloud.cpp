@@ -51,6 +51,7 @@ std::optional<Rays> rays_of(const Cloud& cloud, double step_m) {
       const Point& p = cloud[i];
       if (!finite(p)) continue;
 
+      // The first point of a row or column gives its ray
       if (!(p.z > 0.0F) || static_cast<double>(p.z) > 65534.0 * step_m) return std::nullopt;
       if (std::isnan(rays.x[column])) rays.x[column] = p.x / p.z;
       if (std::isnan(rays.y[row])) rays.y[row] = p.y / p.z;
@@ -60,6 +61,7 @@ std::optional<Rays> rays_of(const Cloud& cloud, double step_m) {
     }
   }
 
+  // Rows and columns without points
   for (float& v : rays.x) v = std::isnan(v) ? 0.0F : v;
   for (float& v : rays.y) v = std::isnan(v) ? 0.0F : v;
   return rays;
@@ -75,6 +77,8 @@ template <std::size_t kPlanes, typename Io>
 void differences(Io& io, std::vector<std::int32_t>& values) {
   std::vector<std::uint32_t> codes(values.size());
   std::uint32_t before = 0;
+
+  // Zigzag code: small differences of either sign are small
   if constexpr (!Io::kReads) {
     for (std::size_t i = 0; i < codes.size(); ++i) {
       const auto now = static_cast<std::uint32_t>(values[i]);
@@ -85,6 +89,8 @@ void differences(Io& io, std::vector<std::int32_t>& values) {
   }
 
   io.template planes<kPlanes>(codes.data(), codes.size());
+
+  // Values are the sums of the differences
   if constexpr (Io::kReads) {
     for (std::size_t i = 0; i < codes.size(); ++i) {
       before += (codes[i] >> 1U) ^ (0U - (codes[i] & 1U));
@@ -101,6 +107,7 @@ void columns(Io& io, const std::vector<Point*>& points) {
   Bytes bytes(5 * count);
   std::array<std::uint8_t, 5> before{};
 
+  // Bytes relative to those of the previous point
   if constexpr (!Io::kReads) {
     for (std::size_t i = 0; i < count; ++i) {
       const Point& p = *points[i];
@@ -117,11 +124,13 @@ void columns(Io& io, const std::vector<Point*>& points) {
 
   io.planes(bytes.data(), bytes.size());
 
+  // Sums of the differences; red and blue are relative to green
   if constexpr (Io::kReads) {
     for (std::size_t i = 0; i < count; ++i) {
       for (std::size_t k = 0; k < before.size(); ++k) {
         before[k] = static_cast<std::uint8_t>(before[k] + bytes[k * count + i]);
       }
+
       Point& p = *points[i];
       p.g = before[0];
       p.r = static_cast<std::uint8_t>(before[0] + before[1]);
@@ -136,6 +145,8 @@ template <typename Io>
 void grid(Io& io, Rays& rays, double step_m, Cloud& cloud) {
   for (float& ray : rays.x) io(ray);
   for (float& ray : rays.y) io(ray);
+
+  // One bit per pixel: it has a point
   std::vector<std::uint8_t> mask((cloud.size() + 7) / 8, 0);
   if constexpr (!Io::kReads) {
     for (std::size_t i = 0; i < cloud.size(); ++i) {
@@ -144,13 +155,15 @@ void grid(Io& io, Rays& rays, double step_m, Cloud& cloud) {
   }
 
   io.planes(mask.data(), mask.size());
+
+  // Points with depth, row by row
   std::vector<Point*> points;
   points.reserve(cloud.size());
-
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     if ((mask[i / 8] >> (i % 8) & 1U) != 0) points.push_back(&cloud[i]);
   }
 
+  // Only depth is stored: x and y follow from the ray
   std::vector<std::int32_t> depths(points.size());
   if constexpr (!Io::kReads) {
     for (std::size_t k = 0; k < points.size(); ++k) depths[k] = steps_of(points[k]->z, step_m);
@@ -184,6 +197,8 @@ Cloud codable_list(const Cloud& cloud, double step_m) {
 template <typename Io>
 void list(Io& io, double step_m, Cloud& cloud) {
   std::vector<std::int32_t> values(cloud.points.size());
+
+  // Each axis apart: consecutive points are close
   for (const auto axis : {&Point::x, &Point::y, &Point::z}) {
     if constexpr (!Io::kReads) {
       for (std::size_t i = 0; i < values.size(); ++i) values[i] = steps_of(cloud.points[i].*axis, step_m);
@@ -194,6 +209,8 @@ void list(Io& io, double step_m, Cloud& cloud) {
         cloud.points[i].*axis = static_cast<float>(values[i] * step_m);
     }
   }
+
+  // Colours and normals of all points
   std::vector<Point*> points;
   points.reserve(cloud.points.size());
   for (Point& p : cloud.points) points.push_back(&p);
@@ -228,6 +245,7 @@ CloudPtr decoded(const Bytes& content) {
       cells <= kMostPoints && cells / 8 <= content.size() && head.step_m > 0.0 && std::isfinite(head.step_m),
       "its head is damaged");
 
+  // Cells of an organised cloud may have no point
   Point none;
   none.x = none.y = none.z = none.normal_x = none.normal_y = none.normal_z = kNan;
   auto cloud = std::make_shared<Cloud>();
@@ -253,6 +271,8 @@ std::vector<std::uint8_t> encode_cloud(const Cloud& cloud) {
   constexpr double kStep_m = 0.00025;
   auto& whole = const_cast<Cloud&>(cloud);  // a writer changes nothing
   ByteWriter writer;
+
+  // Organised clouds are stored as depths along rays
   if (auto rays = rays_of(cloud, kStep_m)) {
     CompactHead head{cloud.width, cloud.height, kStep_m};
     head_fields(writer, head);
@@ -263,6 +283,8 @@ std::vector<std::uint8_t> encode_cloud(const Cloud& cloud) {
     head_fields(writer, head);
     list(writer, kStep_m, codable);
   }
+
+  // Most clouds have the default sensor pose
   if (has_sensor_pose(cloud)) sensor_pose_fields(writer, whole);
   Bytes bytes = core::pack(writer.bytes());
   bytes.insert(bytes.begin(), kCompactMagic.begin(), kCompactMagic.end());
@@ -275,6 +297,8 @@ core::Result<CloudPtr> decode_cloud(const std::uint8_t* bytes, std::size_t size)
     if (size < kCompactMagic.size() || !std::equal(kCompactMagic.begin(), kCompactMagic.end() - 1, bytes)) {
       throw core::BadBytes("its bytes are not a stored cloud");
     }
+
+    // The last byte of the magic is the version
     if (bytes[kCompactMagic.size() - 1] != kCompactMagic.back()) {
       throw core::BadBytes("it was written by another version");
     }

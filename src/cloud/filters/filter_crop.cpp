@@ -68,6 +68,8 @@ class PassThroughFilter : public Filter {
     if (!column_.empty()) return by_column(*input, context);
     pcl::PassThrough<Point> pass;
     pass.setFilterFieldName(field_);
+
+    // Limits are absolute, points relative to the shift
     const std::size_t axis = field_.size() == 1 ? std::string("xyz").find(field_) : std::string::npos;
     const double shift = axis < 3 ? context.shift[static_cast<Eigen::Index>(axis)] : 0.0;
     pass.setFilterLimits(static_cast<float>(min_ - shift), static_cast<float>(max_ - shift));
@@ -81,6 +83,8 @@ class PassThroughFilter : public Filter {
     const CloudColumns& columns = context.columns != nullptr ? *context.columns : none;
     std::vector<std::string> names;
     std::function<double(std::size_t)> value;
+
+    // Any column of the file, by its name
     const auto offer = [&](const std::string& name, const auto& values) {
       if (values.empty()) return;
       names.push_back(name);
@@ -90,14 +94,16 @@ class PassThroughFilter : public Filter {
     offer("confidence", columns.confidence);
     offer("observations", columns.observations);
     offer("robot", columns.robot);
-
     for (const auto& other : columns.others) offer(other.name, other.values);
+
+    // The message lists the columns that exist
     if (!value && !input.empty()) {
       return core::usage_error(
           fmt::format("column: the cloud has no '{}' (it has: {})", column_,
                       names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
     }
 
+    // A value that is not a number is never kept
     return select(input, [&](std::size_t i, const Point&) {
       const double v = value(i);
       return std::isfinite(v) && (v >= min_ && v <= max_) == inside_;

@@ -18,6 +18,8 @@ class FlyingPixelsFilter : public Filter {
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     if (input->empty()) return like(*input);
+
+    // Jumps are between neighbouring pixels
     if (!organised(*input)) {
       return core::usage_error("needs an organised cloud; put it before filters that resample");
     }

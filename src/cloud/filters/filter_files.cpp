@@ -27,20 +27,24 @@ class MergeFilter : public Filter {
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     const auto other = read_cloud(file_, LargeCoordinates::kShifted);
     if (!other) return tl::unexpected<core::Error>(other.error());
-    const auto fits = check_one_frame("the chain's cloud", context.shift, file_, other->shift);
 
+    // Both clouds must be in one frame
+    const auto fits = check_one_frame("the chain's cloud", context.shift, file_, other->shift);
     if (!fits) return tl::unexpected<core::Error>(fits.error());
     if (context.frame != nullptr) {
       const auto same = check_same_up("the chain's cloud", *context.frame, file_, other->frame);
       if (!same) return tl::unexpected<core::Error>(same.error());
     }
 
+    // Both clouds relative to the same shift
     change_shift(*other->cloud, other->shift, context.shift);
+
     auto output = like(*input);
     output->points.reserve(input->size() + other->cloud->size());
     std::vector<std::size_t> chosen[2];
     const Cloud* parts[2] = {input.get(), other->cloud.get()};
 
+    // Finite points of both, the chain's first
     for (std::size_t side = 0; side < 2; ++side) {
       for (std::size_t i = 0; i < parts[side]->size(); ++i) {
         if (!finite((*parts[side])[i])) continue;
@@ -48,8 +52,9 @@ class MergeFilter : public Filter {
         chosen[side].push_back(i);
       }
     }
-
     make_list(*output);
+
+    // Columns follow their points
     if (context.columns != nullptr && context.made_columns != nullptr) {
       *context.made_columns = pick_columns(*context.columns, chosen[0]);
       append_columns(*context.made_columns, chosen[0].size(), pick_columns(other->columns, chosen[1]),
@@ -80,6 +85,7 @@ class TeeFilter : public Filter {
     return core::output_error(fmt::format("{}: there is no folder {}", file_, folder.string()));
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
+    // Several runs of a chain write different files
     fs::path file = file_;
     if (!context.run.empty()) {
       file.replace_filename(file.stem().string() + "_" + context.run + file.extension().string());

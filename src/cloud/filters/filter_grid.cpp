@@ -29,17 +29,19 @@ std::string check_extent(const Cloud& cloud, double leaf) {
     max = max.cwiseMax(p.getVector3fMap().cast<double>());
   }
 
+  // Cell numbers and coordinates must fit 31 bits
   constexpr double kMost = 2147483647.0;
   const Eigen::Array3d cells = ((max - min) / leaf).array().floor() + 2.0;
   const double furthest = std::max(max.cwiseAbs().maxCoeff(), min.cwiseAbs().maxCoeff()) / leaf;
   if (cells.prod() <= kMost && furthest < kMost / 4.0) return "";
 
+  // The smallest leaf that fits, for the message
   double needed = leaf;
   const auto fits = [&](double l) {
     return (((max - min) / l).array().floor() + 2.0).prod() <= kMost && furthest * leaf / l < kMost / 4.0;
   };
-
   while (!fits(needed)) needed *= 1.1;
+
   const Eigen::Vector3d size = max - min;
   return fmt::format(
       "leaf {:g} m is too small for a cloud of {:.4g} x {:.4g} x {:.4g} m ({:.2g} cells, at most 2.1e9); "
@@ -78,8 +80,9 @@ void restore_normals(Cloud& cloud) {
 std::vector<std::int64_t> cells_of(const Cloud& points, float leaf) {
   const float inverse = 1.0F / leaf;
   const auto cell = [inverse](float v) { return static_cast<std::int64_t>(std::floor(v * inverse)); };
-  std::array<std::int64_t, 3> least{};
 
+  // Smallest and largest cell along each axis
+  std::array<std::int64_t, 3> least{};
   std::array<std::int64_t, 3> most{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto [min, max] =
@@ -89,11 +92,11 @@ std::vector<std::int64_t> cells_of(const Cloud& points, float leaf) {
     most[axis] = cell(max->data[axis]);
   }
 
+  // Cells are numbered along x, then y, then z
   const std::int64_t across = most[0] - least[0] + 1;
   const std::int64_t layer = across * (most[1] - least[1] + 1);
   std::vector<std::int64_t> cells;
   cells.reserve(points.size());
-
   for (const Point& p : points.points) {
     cells.push_back(cell(p.x) - least[0] + (cell(p.y) - least[1]) * across + (cell(p.z) - least[2]) * layer);
   }
@@ -105,11 +108,13 @@ std::vector<std::int64_t> cells_of(const Cloud& points, float leaf) {
 /// observations, the first robot.
 CloudColumns mean_columns(const CloudColumns& columns, const std::vector<std::int64_t>& cells,
                           std::size_t least) {
+  // Points of one cell next to each other, in their order
   std::vector<std::size_t> order(cells.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return cells[a] < cells[b]; });
 
+  // Each run of equal cells is one row
   std::vector<std::size_t> firsts;
   std::vector<std::pair<std::size_t, std::size_t>> runs;  // of `order`
   for (std::size_t begin = 0, end = 0; begin < order.size(); begin = end) {
@@ -119,6 +124,7 @@ CloudColumns mean_columns(const CloudColumns& columns, const std::vector<std::in
     runs.emplace_back(begin, end);
   }
 
+  // Means replace the values of the first point
   CloudColumns result = pick_columns(columns, firsts);
   const auto mean = [&](const std::vector<float>& from, std::vector<float>& to) {
     for (std::size_t r = 0; r < to.size(); ++r) {
@@ -132,6 +138,7 @@ CloudColumns mean_columns(const CloudColumns& columns, const std::vector<std::in
   for (std::size_t o = 0; o < result.others.size(); ++o)
     mean(columns.others[o].values, result.others[o].values);
 
+  // A cell was observed as often as its best point
   for (std::size_t r = 0; r < result.observations.size(); ++r) {
     for (std::size_t k = runs[r].first; k < runs[r].second; ++k) {
       result.observations[r] = std::max(result.observations[r], columns.observations[order[k]]);
@@ -148,10 +155,14 @@ class GridFilter : public Filter {
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     const CloudConstPtr points = finite_list(input);
+
+    // PCL would return such a cloud unfiltered
     const std::string problem = check_extent(*points, leaf_m_);
     if (!problem.empty()) return core::usage_error(problem);
     if (points->empty()) return like(*input);
     CloudPtr output = resample(points);
+
+    // The sensor pose remains that of the input
     output->sensor_origin_ = input->sensor_origin_;
     output->sensor_orientation_ = input->sensor_orientation_;
     make_list(*output);
@@ -188,6 +199,8 @@ class VoxelGridFilter : public GridFilter {
     pcl::VoxelGrid<Point> grid;
     grid.setLeafSize(leaf(), leaf(), leaf());
     grid.setMinimumPointsNumberPerVoxel(static_cast<unsigned>(min_points_));
+
+    // Unknown normals must not spoil a cell's mean
     CloudPtr output = filtered_by(grid, without_unknown_normals(points));
     restore_normals(*output);
     return output;
@@ -205,6 +218,8 @@ class ApproximateVoxelGridFilter : public GridFilter {
   CloudPtr resample(const CloudConstPtr& points) const override {
     pcl::ApproximateVoxelGrid<Point> grid;
     grid.setLeafSize(leaf(), leaf(), leaf());
+
+    // Unknown normals must not spoil a cell's mean
     CloudPtr output = filtered_by(grid, without_unknown_normals(points));
     restore_normals(*output);
     return output;

@@ -22,6 +22,8 @@ class MlsFilter : public Filter {
 
     pcl::Indices indices;
     const CloudPtr output = (*pcl)->moving_least_squares(points, radius_m_, order_, indices);
+
+    // Normals stay on their side of the surface
     const Eigen::Vector3f viewpoint = viewpoint_of(*input, context);
     std::vector<std::size_t> sources;  // of the kept points
     for (std::size_t i = 0; i < output->size(); ++i) {
@@ -30,10 +32,12 @@ class MlsFilter : public Filter {
       if (finite((*output)[i])) sources.push_back(source);
     }
 
+    // Columns of the remaining points
     if (context.columns != nullptr && context.made_columns != nullptr) {
       *context.made_columns = pick_columns(carry_columns(*input, *context.columns, *points), sources);
     }
 
+    // Points without a fitted surface are removed
     output->header = input->header;
     output->sensor_origin_ = input->sensor_origin_;
     output->sensor_orientation_ = input->sensor_orientation_;

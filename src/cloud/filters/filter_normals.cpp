@@ -29,6 +29,8 @@ class NormalsFilter : public Filter {
     if (points->empty()) return points;
     const Eigen::Vector3f viewpoint = viewpoint_of(*input, context);
     const int threads = context.executor != nullptr ? context.executor->threads() : 1;
+
+    // The nearest neighbours, or all within the radius
     pcl::NormalEstimationOMP<Point, pcl::Normal> estimation(static_cast<unsigned int>(threads));
     estimation.setSearchMethod(std::make_shared<pcl::search::KdTree<Point>>());
     estimation.setKSearch(neighbours_);
@@ -37,6 +39,8 @@ class NormalsFilter : public Filter {
     estimation.setInputCloud(points);
     pcl::PointCloud<pcl::Normal> normals;
     estimation.compute(normals);
+
+    // Not a number for points with too few neighbours
     for (std::size_t i = 0; i < points->size(); ++i) {
       (*points)[i].getNormalVector3fMap() = normals[i].getNormalVector3fMap();
       (*points)[i].curvature = normals[i].curvature;

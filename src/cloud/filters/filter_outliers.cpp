@@ -20,6 +20,8 @@ class StatisticalOutlierFilter : public Filter {
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& /*context*/) const override {
     const CloudConstPtr points = finite_list(input);
     if (points->size() < 3) return finite_list(*points);
+
+    // A point is not its own neighbour
     pcl::StatisticalOutlierRemoval<Point> removal;
     removal.setMeanK(std::min(neighbours_, static_cast<int>(points->size()) - 1));
     removal.setStddevMulThresh(deviations_);
@@ -40,6 +42,8 @@ class RadiusOutlierFilter : public Filter {
   [[nodiscard]] std::optional<double> reach_m() const override { return radius_m_; }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& /*context*/) const override {
     const CloudConstPtr points = finite_list(input);
+
+    // No point can have enough neighbours
     if (points->size() <= static_cast<std::size_t>(min_neighbours_)) return like(*input);
     pcl::RadiusOutlierRemoval<Point> removal;
     removal.setRadiusSearch(radius_m_);

@@ -14,6 +14,8 @@ class RandomSamplingFilter : public Filter {
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     const CloudConstPtr points = finite_list(input);
+
+    // Fewer points than wanted: all of them
     if (points->size() <= static_cast<std::size_t>(count_)) return finite_list(*points);
     pcl::RandomSample<Point> sample;
     sample.setSample(static_cast<unsigned>(count_));

@@ -85,6 +85,8 @@ class PlaneFilter : public Filter {
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
     const CloudConstPtr points = finite_list(input);
     std::vector<int> segments(points->size(), kNoSegment);
+
+    // The largest plane first, the next among the other points
     auto rest = std::make_shared<pcl::Indices>(points->size());
     for (std::size_t i = 0; i < rest->size(); ++i) (*rest)[i] = static_cast<pcl::index_t>(i);
     for (int plane = 0; plane < planes_ && spans_a_plane(*points, *rest); ++plane) {
@@ -161,6 +163,7 @@ class ClustersFilter : public Filter {
     const int fewest =
         std::min(min_points_, static_cast<int>(std::ceil(min_share_ * static_cast<double>(points->size()))));
 
+    // Over means of cells, if a leaf is given
     std::vector<pcl::Indices> clusters;
     if (leaf_m_ > 0.0) {
       constexpr double kMostCells = 1e9;  // from the origin: pcl::VoxelGrid numbers them with 31 bits
@@ -182,6 +185,7 @@ class ClustersFilter : public Filter {
       return a.size() != b.size() ? a.size() > b.size() : a.front() < b.front();
     });
 
+    // Each cluster is a segment
     if (count_ > 0) clusters.resize(std::min(clusters.size(), static_cast<std::size_t>(count_)));
     for (std::size_t c = 0; c < clusters.size(); ++c) {
       for (const auto i : clusters[c]) segments[static_cast<std::size_t>(i)] = static_cast<int>(c);
@@ -191,6 +195,7 @@ class ClustersFilter : public Filter {
   }
 
  private:
+  // Groups of points connected by steps of at most `distance_m`.
   static std::vector<pcl::Indices> clusters_of(const CloudConstPtr& points, double distance_m,
                                                int min_points) {
     const auto tree = std::make_shared<pcl::search::KdTree<Point>>(false);
@@ -208,14 +213,15 @@ class ClustersFilter : public Filter {
     return clusters;
   }
 
-  /// Groups the means of cells; what belongs to a mean goes with it. Block by block: however far the cloud
-  /// reaches, no grid has more cells than pcl::VoxelGrid can count.
+  /// Clusters the means of cells; points follow their mean. Block by block: however far the cloud reaches, no
+  /// grid has more cells than pcl::VoxelGrid can count.
   [[nodiscard]] std::vector<pcl::Indices> clusters_of_cells(const CloudConstPtr& points, double distance_m,
                                                             int min_points) const {
     constexpr float kBlock = 64.0F;  // cells along each side
     const auto leaf = static_cast<float>(leaf_m_);
     const auto block = [&](float x) { return static_cast<int>(std::floor(x / (kBlock * leaf))); };
 
+    // Blocks of few enough cells for PCL to number
     std::map<std::array<int, 3>, pcl::IndicesPtr> blocks;
     for (std::size_t i = 0; i < points->size(); ++i) {
       const Point& p = (*points)[i];
@@ -224,6 +230,7 @@ class ClustersFilter : public Filter {
       indices->push_back(static_cast<pcl::index_t>(i));
     }
 
+    // Means of cells; every point knows the mean of its cell
     pcl::VoxelGrid<Point> grid;
     grid.setInputCloud(points);
     grid.setLeafSize(leaf, leaf, leaf);
@@ -245,6 +252,7 @@ class ClustersFilter : public Filter {
       *means += part;
     }
 
+    // Clusters of means
     const std::vector<pcl::Indices> groups = clusters_of(means, distance_m, 1);
     std::vector<std::uint32_t> group_of(means->size());
     for (std::size_t g = 0; g < groups.size(); ++g) {
@@ -252,11 +260,13 @@ class ClustersFilter : public Filter {
         group_of[static_cast<std::size_t>(mean)] = static_cast<std::uint32_t>(g);
     }
 
+    // Points join the cluster of their mean
     std::vector<pcl::Indices> clusters(groups.size());
     for (std::size_t i = 0; i < points->size(); ++i) {
       clusters[group_of[mean_of[i]]].push_back(static_cast<pcl::index_t>(i));
     }
 
+    // Small clusters are left out
     const auto few = [&](const pcl::Indices& c) { return c.size() < static_cast<std::size_t>(min_points); };
     clusters.erase(std::remove_if(clusters.begin(), clusters.end(), few), clusters.end());
     return clusters;

@@ -68,22 +68,24 @@ template <typename Keep>
 CloudPtr select(const Cloud& input, const Keep& keep) {
   auto output = like(input);
 
+  // An organised cloud keeps its shape: rejected points become NaN
   if (organised(input)) {
     output->points = input.points;
     output->width = input.width;
     output->height = input.height;
     output->is_dense = false;
+
     for (std::size_t i = 0; i < input.size(); ++i) {
       if (!finite(input[i]) || !keep(i, input[i])) reject(output->points[i]);
     }
     return output;
   }
 
+  // A list only holds the chosen points
   output->points.reserve(input.size());
   for (std::size_t i = 0; i < input.size(); ++i) {
     if (finite(input[i]) && keep(i, input[i])) output->points.push_back(input[i]);
   }
-
   make_list(*output);
   return output;
 }
@@ -110,7 +112,7 @@ CloudPtr filtered_by(PclFilter& filter, const CloudConstPtr& input) {
   return output;
 }
 
-/// The finite points as a list of the caller's own: what PCL's searches and grids can be given without harm.
+/// The finite points as a new list, as PCL's searches and grids need them.
 inline CloudPtr finite_list(const Cloud& input) {
   auto output = like(input);
   output->points.reserve(input.size());

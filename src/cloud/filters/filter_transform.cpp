@@ -7,8 +7,7 @@
 namespace plumbline::cloud {
 namespace {
 
-/// The frame after the motion: only what is up in it is known, if it is one of the two directions with a
-/// name.
+/// The frame after the motion: only its up axis is known, and only if that is z or -y.
 CloudFrame moved_frame(const CloudFrame& frame, const Eigen::Matrix3d& rotation) {
   constexpr double kSame = 1e-6;
   const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
@@ -28,18 +27,24 @@ class TransformFilter : public Filter {
                   "Roll, pitch, yaw: about x first, then y, then z of the fixed frame");
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
+    // About the fixed x axis first, then y, then z
     Eigen::Isometry3d transform = Eigen::Isometry3d::Identity();
     transform.linear() = (Eigen::AngleAxisd(rotation_rad_[2], Eigen::Vector3d::UnitZ()) *
                           Eigen::AngleAxisd(rotation_rad_[1], Eigen::Vector3d::UnitY()) *
                           Eigen::AngleAxisd(rotation_rad_[0], Eigen::Vector3d::UnitX()))
                              .toRotationMatrix();
     transform.translation() << translation_m_[0], translation_m_[1], translation_m_[2];
+
+    // Up in the file's header turns with the cloud
     if (context.frame != nullptr) *context.frame = moved_frame(*context.frame, transform.linear());
     if (input->empty()) return like(*input);
 
+    // Points are relative to the shift, which stays
     transform.translation() += transform.linear() * context.shift - context.shift;
     auto output = std::make_shared<Cloud>();
     pcl::transformPointCloudWithNormals(*input, *output, transform.matrix().cast<float>().eval());
+
+    // The sensor pose moves with the points
     const Eigen::Vector3d origin = input->sensor_origin_.head<3>().cast<double>();
     output->sensor_origin_.head<3>() = (transform * origin).cast<float>();
     const Eigen::Quaterniond turned(transform.linear() *

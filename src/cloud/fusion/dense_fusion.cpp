@@ -61,6 +61,7 @@ class Fusion {
     if (!views_.covariances.empty()) all.columns.others.push_back({kSigmaColumn, {}});
     add({}, all);
 
+    // Tiles that fit into memory together
     const std::size_t most_cells = cells_at_a_time(options_);
     for (std::size_t first = 0, count = 0; first < tiles_.size(); first += count) {
       std::size_t cells = 0;
@@ -97,6 +98,7 @@ class Fusion {
       }
       world_from_cloud_[v] = views_.world_from_camera[v] * sensor_pose(**cloud);
 
+      // Depth-only views have free space, but no surface
       is_depth_view_[v] = is_depth_view(**cloud, views_.cameras[v]) ? 1 : 0;
       if (is_depth_view_[v] == 0) cells[v] = color_cells(**cloud, world_from_cloud_[v], kCell_m);
       if (options_.free_space) rasters_[v] = depth_raster(**cloud, views_.cameras[v]);
@@ -104,11 +106,13 @@ class Fusion {
 
     if (auto failed = first_error(done); !failed) return failed;
     if (!views_.covariances.empty()) find_pose_noise(cells);
+
+    // Tiles bound the memory of the fusion
     tiles_ = plan_tiles(cells, cells_per_tile(options_));
     report.tiles = tiles_.size();
 
+    // Gains that make shared cells agree in colour
     if (!options_.exposure) return {};
-
     gains_ = color_gains(cells);
     for (const Eigen::Vector3f& gain : gains_) {
       report.least_gain = std::min(report.least_gain, static_cast<double>(gain.minCoeff()));
@@ -118,18 +122,21 @@ class Fusion {
     return {};
   }
 
-  /// Lays the views into the voxels of the tiles from `first` on, a few views at a time: each is read once
-  /// for all of these tiles, and every tile takes the views in their order. Beside that the next views are
+  /// Inserts the views into the voxels of the tiles from `first` on, a few views at a time: each is read once
+  /// for all of these tiles, and every tile takes the views in their order. Meanwhile the next views are
   /// measured.
   core::Result<void> fill(std::size_t first, std::vector<VoxelMap>& voxels) {
     constexpr std::size_t kViewsAtATime = 2;
+
+    // Views that any of these tiles needs, each once
     std::vector<std::uint32_t> views;
     for (std::size_t k = 0; k < voxels.size(); ++k) {
       views.insert(views.end(), tiles_[first + k].views.begin(), tiles_[first + k].views.end());
     }
-
     std::sort(views.begin(), views.end());
     views.erase(std::unique(views.begin(), views.end()), views.end());
+
+    // The next views are measured while the last are inserted
     std::vector<std::vector<VoxelSample>> measured;  // of the views from `at` on
     for (std::size_t at = 0; at < views.size() || !measured.empty();) {
       const std::size_t next = at + measured.size();
@@ -167,13 +174,15 @@ class Fusion {
     const auto cloud = views_.read(v);
     if (!cloud) return tl::unexpected<core::Error>(cloud.error());
     if (!gains_.empty()) apply_gain(**cloud, gains_[v]);
+
+    // Robots are counted only if there are several
     const std::uint8_t robot = several_robots() ? views_.robots[v] : std::uint8_t{0};
     samples = VoxelMap::measured(**cloud, world_from_cloud_[v], options_.voxels, robot);
     return {};
   }
 
-  /// Estimate for all tiles, from the first ones and with some reserve: it costs nothing until it is used,
-  /// while a growing list would be there twice.
+  /// Estimate for all tiles, from the first ones and with some reserve: reserved memory costs nothing until
+  /// it is used, while a growing list would exist twice.
   [[nodiscard]] std::size_t expected_points(const std::vector<VoxelMap>& first_tiles) const {
     constexpr double kReserve = 1.2;
     std::size_t voxels = 0, cells = 0, all_cells = 0;
@@ -227,13 +236,19 @@ class Fusion {
   /// Removes points that are seen through and isolated points, and projects the rest.
   void clean(std::vector<FusedPoint>& points, FusionReport& report) const {
     Surfels surfels(points, block_m(options_.voxels.voxel_m));
+
+    // Surfels in the free space of other views
     std::vector<std::uint8_t> goes(surfels.all().size(), 0);
     if (options_.free_space) goes = seen_through(surfels, rasters_, is_depth_view_, world_from_cloud_);
+
+    // Thin walls: points onto the planes of their surfels
     surfels.fit_planes();
     if (options_.plane_projection) surfels.project(points);
+
     const auto least = static_cast<std::uint32_t>(options_.min_support);
     std::size_t kept = 0;
 
+    // Isolated points have too few neighbours of similar normal
     for (std::size_t i = 0; i < points.size(); ++i) {
       const std::uint32_t s = surfels.of(i);
       if (s != Surfels::kNone && goes[s] != 0) {
@@ -281,6 +296,8 @@ class Fusion {
       const auto found = pose_noise_.find(pack_cell(cell_of(at)));
 
       if (found != pose_noise_.end()) pose = &found->second;
+
+      // Variance along the normal, of depth and of poses
       float variance = fused.noise_m * fused.noise_m / static_cast<float>(std::max(1U, fused.observations));
       if (pose != nullptr) {
         const Eigen::Vector3f normal = fused.point.getNormalVector3fMap();
@@ -336,6 +353,7 @@ FusedCloud coarser(const Cloud& cloud, const CloudColumns& columns, double voxel
   constexpr float kMost = 0.9999F;
   std::vector<FusedPoint> points(cloud.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
+    // Confidence is weight / (1 + weight)
     const float confidence =
         i < columns.confidence.size() ? std::clamp(columns.confidence[i], 1e-4F, kMost) : 0.5F;
     points[i].point = cloud[i];

@@ -34,14 +34,15 @@ std::size_t count_colored(const std::vector<ColorCell>& view) {
       std::count_if(view.begin(), view.end(), [](const auto& cell) { return cell.points >= kFewestPoints; }));
 }
 
-/// Cell by cell, those that two views or more saw in colour. There are thousands for each view, so the list
-/// is allocated once, and sorted and thinned in place.
+/// Colours of the cells that at least two views saw, cell by cell. There are thousands for each view, so the
+/// list is allocated once, and sorted and thinned in place.
 std::vector<CellColor> shared_colors(const std::vector<std::vector<ColorCell>>& views) {
   std::size_t count = 0;
   for (const auto& view : views) count += count_colored(view);
   std::vector<CellColor> all;
   all.reserve(count);
 
+  // The mean colour of few points is too noisy
   for (std::size_t v = 0; v < views.size(); ++v) {
     for (const ColorCell& cell : views[v]) {
       if (cell.points < kFewestPoints) continue;
@@ -49,10 +50,12 @@ std::vector<CellColor> shared_colors(const std::vector<std::vector<ColorCell>>& 
     }
   }
 
+  // Colours of one cell next to each other
   std::sort(all.begin(), all.end(), [](const CellColor& a, const CellColor& b) {
     return a.cell != b.cell ? a.cell < b.cell : a.view < b.view;
   });
 
+  // A cell in a single view says nothing about exposure
   auto kept = all.begin();
   for (auto first = all.begin(), end = first; first != all.end(); first = end) {
     end = std::find_if(first, all.end(), [&](const CellColor& c) { return c.cell != first->cell; });
@@ -85,12 +88,14 @@ std::vector<ColorCell> color_cells(const Cloud& camera_cloud, const geometry::Ri
     if (last == nullptr || last->cell != key) last = &sums[key];
     last->cell = key;
 
+    // Dark and saturated colours do not show the exposure
     const auto [least, most] = std::minmax({p.r, p.g, p.b});
     if (least < kDark || most > kBright) continue;
     last->color += Eigen::Vector3f(p.r, p.g, p.b);
     last->points += 1.0F;
   }
 
+  // Means in the order of the cells
   std::vector<ColorCell> cells;
   cells.reserve(sums.size());
   for (const auto& [key, sum] : sums)
@@ -110,11 +115,13 @@ std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell
 
   std::vector<Sum> of_views(views.size());
   for (int round = 0; round < kExposureRounds; ++round) {
+    // The prior keeps views without shared cells unchanged
     for (Sum& view : of_views) {
       view.wanted.setZero();
       view.weight.setConstant(kPrior);
     }
 
+    // Mean colour of a cell with the present gains
     for (std::size_t first = 0, end = 0; first < colors.size(); first = end) {
       Eigen::Array3f sum = Eigen::Array3f::Zero();
       Eigen::Array3f weight = Eigen::Array3f::Zero();
@@ -125,6 +132,8 @@ std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell
       }
 
       const Eigen::Array3f mean = sum / weight;
+
+      // Gain that each view needs; outliers count less
       for (std::size_t i = first; i < end; ++i) {
         CellColor& s = colors[i];
         Sum& view = of_views[s.view];
@@ -135,6 +144,7 @@ std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell
       }
     }
 
+    // Only ratios are observable: the mean gain is 1
     Eigen::Array3f drift = Eigen::Array3f::Zero();
     for (Sum& view : of_views) {
       view.log_gain = (view.wanted / view.weight).max(-kMostLog).min(kMostLog);
@@ -145,6 +155,7 @@ std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell
     for (Sum& view : of_views) view.log_gain -= drift;
   }
 
+  // Limited again, since the mean was subtracted
   std::vector<Eigen::Vector3f> factors(views.size(), Eigen::Vector3f::Ones());
   for (const CellColor& s : colors)
     factors[s.view] = of_views[s.view].log_gain.max(-kMostLog).min(kMostLog).exp();

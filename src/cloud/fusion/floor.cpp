@@ -53,6 +53,8 @@ pcl::Indices level_plane(const CloudConstPtr& points, const pcl::IndicesPtr& amo
   pcl::PointIndices inliers;
   pcl::ModelCoefficients coefficients;
   segmentation.segment(inliers, coefficients);
+
+  // The caller subtracts sorted sets
   std::sort(inliers.indices.begin(), inliers.indices.end());
 
   for (std::size_t i = 0; i < 4 && !inliers.indices.empty(); ++i) {
@@ -76,9 +78,12 @@ std::vector<Found> planes_of(const CloudConstPtr& points, const Eigen::Vector3d&
     const pcl::Indices inliers = level_plane(points, left, up, plane);
     if (inliers.size() < enough) break;
 
+    // Normals point up
     const double sign = plane.head<3>().dot(up) < 0.0 ? -1.0 : 1.0;
     planes.push_back({{sign * plane.head<3>(), -sign * plane[3]}, inliers.size()});
     enough = std::max(enough, static_cast<std::size_t>(kLargeShare * static_cast<double>(inliers.size())));
+
+    // The next plane is among the other points
     auto rest = std::make_shared<pcl::Indices>();
     std::set_difference(left->begin(), left->end(), inliers.begin(), inliers.end(),
                         std::back_inserter(*rest));
@@ -94,6 +99,8 @@ std::optional<Floor> find_floor(const CloudConstPtr& cloud, const Eigen::Vector3
   if (cloud == nullptr || cloud->empty()) return std::nullopt;
   const CloudConstPtr points = thinned(*cloud, about_up.cast<float>());
   const std::vector<Found> planes = planes_of(points, about_up);
+
+  // The lowest of the planes parallel to the largest
   const double alongside = std::cos(5.0 * M_PI / 180.0);
   std::optional<Floor> floor;
   for (const Found& found : planes) {

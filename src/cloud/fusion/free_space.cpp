@@ -49,6 +49,7 @@ NearViews views_near(const Eigen::AlignedBox3d& box, const std::vector<DepthRast
   constexpr double kWidest = 1.5;  // distance over depth at the image's corners, at most
   NearViews views;
   for (std::size_t v = 0; v < rasters.size(); ++v) {
+    // The view's furthest depth ends before the box
     const double distance = box.exteriorDistance(world_from_camera[v].translation);
     if (distance > kWidest * static_cast<double>(rasters[v].furthest_m)) continue;
     const geometry::Rigid3 camera_from_world = world_from_camera[v].inverse();
@@ -73,7 +74,7 @@ void count(const std::vector<std::uint32_t>& asked, const std::vector<Eigen::Vec
 
 Verdict judge(const Votes& v) {
   const int free = v[Evidence::kFree], surface = v[Evidence::kSurface], hidden = v[Evidence::kHidden];
-  // One view against another is enough when no third one knows better.
+  // A single view through the place only decides against a single view of a surface.
   if (free > 0 && 2 * free >= surface && (free > 1 || surface < 2)) return Verdict::kGoes;
   if (hidden >= 3 && 3 * surface <= hidden) return Verdict::kHardlySeen;
   return free > 0 ? Verdict::kDoubtful : Verdict::kStays;
@@ -106,7 +107,7 @@ class Surroundings {
     for (std::uint32_t s = 0; s < positions.size(); ++s) cells_[pack_cell(cell(s))].push_back(s);
   }
 
-  /// True if at least half of the certain points within the radius go.
+  /// True if at least half of the certain points within the radius are removed.
   [[nodiscard]] bool go(std::uint32_t surfel, const std::vector<Verdict>& verdicts) const {
     std::size_t going = 0;
     std::size_t staying = 0;
@@ -146,6 +147,7 @@ DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camer
 
   raster.nearest.assign(static_cast<std::size_t>(raster.width) * static_cast<std::size_t>(raster.height), 0);
 
+  // Nearest depth of each cell; in mm, 16 bits suffice for 65 m
   for (const Point& p : camera_cloud.points) {
     if (!(p.z > 0.0F && p.z < 65.0F)) continue;
     const Eigen::Vector2d pixel = camera.project(p.getVector3fMap().cast<double>());
@@ -180,6 +182,7 @@ DepthLimits::DepthLimits(const DepthRaster& raster)
       measured[i] = static_cast<std::uint16_t>((above != 0) + (here != 0) + (below != 0));
     }
 
+    // Limits over 3 x 3 cells, if enough have depth
     for (std::size_t i = 1; i + 1 < width; ++i) {
       if (measured[i - 1] + measured[i] + measured[i + 1] < kFewestCells) continue;
       nearest_[begin + i] = static_cast<std::uint16_t>(std::min({least[i - 1], least[i], least[i + 1]}) + 1);
@@ -195,6 +198,7 @@ Evidence DepthLimits::evidence(const Eigen::Vector3f& point) const {
   const float z = point.z();
   if (!(z > 0.05F && z <= raster_.furthest_m + 0.5F)) return Evidence::kNone;
 
+  // Cells at the border lack neighbours
   const sensor::Pinhole& camera = raster_.camera;
   const float column =
       (static_cast<float>(camera.fx) * point.x() / z + static_cast<float>(camera.cx)) / kCell;
@@ -204,10 +208,12 @@ Evidence DepthLimits::evidence(const Eigen::Vector3f& point) const {
     return Evidence::kNone;
   }
 
+  // A cell without depth is no evidence
   const auto cell =
       static_cast<std::size_t>(static_cast<int>(row) * raster_.width + static_cast<int>(column));
   if (furthest_[cell] == 0) return Evidence::kNone;
 
+  // Depths between the nearest and the furthest are surface
   const auto margin = [](double depth) { return kSigmas * sensor::depth_sigma(depth) + kPose_m; };
   const double near_m = 0.001 * nearest_[cell];
   const double far_m = 0.001 * furthest_[cell];
@@ -221,6 +227,8 @@ CloudPtr depth_view(const sensor::RgbdFrame& frame, const sensor::Pinhole& camer
   constexpr int kCell = DepthRaster::kCell_px;
   const auto least = static_cast<float>(min_depth_m), most = static_cast<float>(max_depth_m);
   const int columns = (camera.width + kCell - 1) / kCell, rows = (camera.height + kCell - 1) / kCell;
+
+  // NaN in cells without depth
   Point none;
   none.x = none.y = none.z = none.normal_x = none.normal_y = none.normal_z = kNan;
   none.r = none.g = none.b = 0;
@@ -233,9 +241,11 @@ CloudPtr depth_view(const sensor::RgbdFrame& frame, const sensor::Pinhole& camer
   const int height = std::min(frame.depth.rows, rows * kCell),
             width = std::min(frame.depth.cols, columns * kCell);
 
+  // Nearest depth of each cell
   for (int v = 0; v < height; ++v) {
     const float* depth = frame.depth.ptr<float>(v);
     Point* cells = view->points.data() + static_cast<std::ptrdiff_t>(v / kCell) * columns;
+
     for (int u = 0; u < width; ++u) {
       const float z = depth[u];
       if (!(z >= least && z <= most)) continue;
@@ -244,6 +254,7 @@ CloudPtr depth_view(const sensor::RgbdFrame& frame, const sensor::Pinhole& camer
     }
   }
 
+  // Points on the rays through the cells' centres
   const auto fx = static_cast<float>(camera.fx), fy = static_cast<float>(camera.fy);
   const auto cx = static_cast<float>(camera.cx), cy = static_cast<float>(camera.cy);
   constexpr float kMiddle = 0.5F * static_cast<float>(kCell) - 0.5F;
@@ -265,6 +276,8 @@ bool is_depth_view(const Cloud& camera_cloud, const sensor::Pinhole& camera) {
       camera_cloud.height != static_cast<std::uint32_t>((camera.height + kCell - 1) / kCell)) {
     return false;
   }
+
+  // Only surface views have normals
   return std::none_of(camera_cloud.points.begin(), camera_cloud.points.end(),
                       [](const Point& p) { return std::isfinite(p.normal_x); });
 }

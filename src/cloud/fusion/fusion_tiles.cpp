@@ -23,6 +23,7 @@ void cut(const Cells::iterator& begin, const Cells::iterator& end, const Eigen::
   const Eigen::Vector3i size = box.sizes();
   size.maxCoeff(&axis);
 
+  // Few enough cells: a tile, with the cells around
   if (count <= most_cells || size[axis] == 0) {
     const Eigen::AlignedBox3i around(box.min() - Eigen::Vector3i::Ones(),
                                      box.max() + Eigen::Vector3i::Ones());
@@ -37,7 +38,7 @@ void cut(const Cells::iterator& begin, const Cells::iterator& end, const Eigen::
   const auto middle = begin + static_cast<std::ptrdiff_t>(count / 2);
   std::nth_element(begin, middle, end, by_axis);
 
-  // Both sides must get something: the cut lies below the median, unless that is the lowest plane.
+  // Neither side may be empty: the cut is below the median, unless that is the lowest plane.
   const int at = std::max((*middle)[axis], box.min()[axis] + 1);
   const auto border =
       std::partition(begin, end, [axis, at](const Eigen::Vector3i& cell) { return cell[axis] < at; });
@@ -76,6 +77,7 @@ std::vector<FusionTile> plan_tiles(const std::vector<std::vector<ColorCell>>& vi
   const Eigen::AlignedBox3i space(-most, most);
   cut(cells.begin(), cells.end(), space, std::max<std::size_t>(1, std::min(most_cells, share)), tiles);
 
+  // Views with points in the tile or its margin
   for (std::size_t v = 0; v < views.size(); ++v) {
     for (FusionTile& tile : tiles) {
       const Eigen::AlignedBox3i with_margin(tile.cells.min() - Eigen::Vector3i::Ones(),

@@ -12,20 +12,6 @@ constexpr float kSmoothTangent = 1.73F;  // up to 60 degrees from face on are sm
 constexpr float kLinkTangent = 3.73F;    // up to 75 degrees the surface is assumed to continue
 constexpr float kCreaseSigmas = 4.0F;
 
-/// Adds a pair of opposite neighbours to the sum and weight of each cell where both lie on the surface of
-/// `reference`. Pairs keep the mean of a slanted plane unbiased where the window is cut by a border or a
-/// jump.
-void accumulate(const float* before, const float* after, const float* reference, const float* gate,
-                float reach, int count, float* sum, float* weight) {
-  for (int i = 0; i < count; ++i) {
-    const float limit = gate[i] + reach * reference[i];
-    const float worst = std::max(std::abs(before[i] - reference[i]), std::abs(after[i] - reference[i]));
-    const float same = worst < limit ? 1.0F : 0.0F;
-    sum[i] += same * (before[i] + after[i]);
-    weight[i] += same + same;
-  }
-}
-
 /// Converts depth to 1/z; 0 where there is no measurement.
 void invert(const float* depth, int count, float min_depth, float max_depth, float* inverse) {
   for (int i = 0; i < count; ++i) {
@@ -46,8 +32,20 @@ struct Pass {
     std::copy(reference, reference + cells_, sum.begin());
     std::fill(weight.begin(), weight.end(), 1.0F);
   }
+  /// Adds a pair of opposite neighbours to each cell where both lie on the surface of `reference`. Pairs keep
+  /// the mean of a slanted plane unbiased where the window is cut by a border or a jump.
   void add(const float* before, const float* after, const float* reference, float reach) {
-    accumulate(before, after, reference, gate.data(), reach, cells_, sum.data(), weight.data());
+    const float* gates = gate.data();
+    float* sums = sum.data();
+    float* weights = weight.data();
+    const int count = cells_;
+    for (int i = 0; i < count; ++i) {
+      const float limit = gates[i] + reach * reference[i];
+      const float worst = std::max(std::abs(before[i] - reference[i]), std::abs(after[i] - reference[i]));
+      const float same = worst < limit ? 1.0F : 0.0F;
+      sums[i] += same * (before[i] + after[i]);
+      weights[i] += same + same;
+    }
   }
   /// A cell without measurement keeps the mean 0: its measured neighbours differ by more than any gate.
   void finish(float* mean) const {
@@ -111,11 +109,13 @@ Grid smooth_inverse_depth(const cv::Mat& depth, int stride, int window, float mi
   smoothed.values.resize(static_cast<std::size_t>(smoothed.width) *
                          static_cast<std::size_t>(smoothed.height));
 
+  // Along columns, for the remaining rows only
   Pass pass(rows.width);
   for (int j = 0; j < smoothed.height; ++j) {
     const int v = j * stride;
     const float* reference = rows.row(v);
     pass.start(reference);
+
     for (int d = 1; d <= std::min({half, v, rows.height - 1 - v}); ++d) {
       pass.add(rows.row(v - d), rows.row(v + d), reference, static_cast<float>(d) * kSmoothTangent / focal);
     }
@@ -139,6 +139,7 @@ void widen_means(Grid& grid, int step, float noise, float wanted_m) {
         const float sigma = noise * inverse_depth_sigma(middle);
         const float pair = from[i - stride] + from[i + stride];
 
+        // Only where noisy, and straight within the noise
         const bool noisy = sigma > wanted_m * middle * middle;
         const bool straight = std::abs(pair - 2.0F * middle) < kStraight * sigma;
         to[i] = noisy && straight ? (pair + middle) * (1.0F / 3.0F) : middle;
@@ -146,6 +147,7 @@ void widen_means(Grid& grid, int step, float noise, float wanted_m) {
     }
   };
 
+  // First along rows, then along columns
   along(step, true);
   along(static_cast<std::ptrdiff_t>(step) * grid.width, false);
 }
@@ -155,15 +157,17 @@ Reach surface_reach(const Grid& grid, int stride, float focal, int longest) {
   Reach reach{std::vector<std::uint8_t>(count), std::vector<std::uint8_t>(count),
               std::vector<std::uint8_t>(count), std::vector<std::uint8_t>(count)};
   const float tangent = static_cast<float>(stride) * kLinkTangent / focal;
+
+  // Neighbours are linked if noise or slope explains their difference
   const auto linked = [tangent](float a, float b) {
     const float nearer = std::max(a, b);
     return std::min(a, b) > 0.0F && std::abs(a - b) < 2.0F * inverse_depth_sigma(nearer) + tangent * nearer;
   };
-
   const auto next = [longest](std::uint8_t n) { return static_cast<std::uint8_t>(std::min(longest, n + 1)); };
   const auto width = static_cast<std::size_t>(grid.width);
   const float* w = grid.values.data();
 
+  // The reach grows by one with each link
   for (std::size_t row = 0; row < count; row += width) {
     for (std::size_t i = row + 1; i < row + width; ++i) {
       reach.left[i] = linked(w[i], w[i - 1]) ? next(reach.left[i - 1]) : std::uint8_t{0};
@@ -176,7 +180,6 @@ Reach surface_reach(const Grid& grid, int stride, float focal, int longest) {
   for (std::size_t i = width; i < count; ++i) {
     reach.up[i] = linked(w[i], w[i - width]) ? next(reach.up[i - width]) : std::uint8_t{0};
   }
-
   for (std::size_t i = count; i-- > width;) {
     reach.down[i - width] = linked(w[i], w[i - width]) ? next(reach.down[i]) : std::uint8_t{0};
   }
@@ -190,6 +193,7 @@ Slope slope_along(const float* centre, std::ptrdiff_t step, int before, int afte
   Slope slope;
   if (before + after < std::max(2, base / 2)) return slope;
 
+  // Central difference over both sides
   slope.known = true;
   const float first = centre[-before * step];
   const float last = centre[after * step];
@@ -197,6 +201,7 @@ Slope slope_along(const float* centre, std::ptrdiff_t step, int before, int afte
   const int side = std::max(2, base / 3);
   if (before < side || after < side) return slope;
 
+  // At a crease both sides differ by more than noise
   const float slope_before = (*centre - first) / static_cast<float>(before);
   const float slope_after = (last - *centre) / static_cast<float>(after);
   slope.bend = slope_after - slope_before;

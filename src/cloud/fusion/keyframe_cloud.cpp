@@ -33,18 +33,21 @@ float smoothing_share(const cv::Mat& depth, float min_depth, float max_depth) {
   constexpr std::size_t kFew = 200;
   std::vector<float> bends;
 
+  // Bending of the inverse depth, relative to its noise
   for (int v = 0; v < depth.rows; v += kStep) {
     const float* row = depth.ptr<float>(v);
     for (int u = kStep; u + kStep < depth.cols; u += kStep) {
       const float least = std::min({row[u - kStep], row[u], row[u + kStep]});
       const float most = std::max({row[u - kStep], row[u], row[u + kStep]});
       if (!(least >= min_depth && most <= max_depth)) continue;
+
       const float w = 1.0F / row[u];
       const float bend = std::abs(1.0F / row[u - kStep] + 1.0F / row[u + kStep] - 2.0F * w);
       bends.push_back(bend / (2.45F * inverse_depth_sigma(w)));
     }
   }
 
+  // Too few pixels to judge: the model's noise
   if (bends.size() < kFew) return 1.0F;
   const float share = core::median(std::move(bends)) / (0.5F * kMedianOfNormal);
   return std::min(1.0F, share * share);
@@ -82,6 +85,8 @@ class PointMaker {
     const float y = (static_cast<float>(v) - cy_) / fy_;
     for (int i = 0; i < grid_.width; ++i) {
       Point& p = out[i];
+
+      // White if there is no colour image
       const int u = i * stride_;
       const cv::Vec3b bgr = color == nullptr ? cv::Vec3b(255, 255, 255) : color[u];
       p.b = bgr[0];
@@ -90,11 +95,13 @@ class PointMaker {
       p.a = 255;
       p.normal_x = p.normal_y = p.normal_z = kNan;
 
+      // Pixels without depth
       if (w[i] == 0.0F) {
         p.x = p.y = p.z = kNan;
         continue;
       }
 
+      // Position from the mean, or from the raw depth
       const float x = (static_cast<float>(u) - cx_) / fx_;
       p.z = position_.values.empty() ? depth[u] : 1.0F / position_.row(j)[i];
       p.x = x * p.z;
@@ -115,6 +122,7 @@ class PointMaker {
     const float most = 3.0F * smoothing_share(frame_.depth, static_cast<float>(options.min_depth_m),
                                               static_cast<float>(options.max_depth_m));
 
+    // No point moves farther than the noise
     for (int j = 0; j < means.height; ++j) {
       const float* depth = frame_.depth.ptr<float>(j * stride_);
       float* row = means.row(j);
@@ -140,6 +148,7 @@ class PointMaker {
         slope_along(w, grid_.width, reach_.up[cell], reach_.down[cell], base, noise_ * sigma);
     if (!along_y.known) return;
 
+    // The normal is the gradient of the inverse depth
     const float per_x = fx_ / static_cast<float>(stride_);
     const float per_y = fy_ / static_cast<float>(stride_);
     const float a = along_x.value * per_x;
@@ -194,6 +203,8 @@ CloudPtr organised_cloud(const sensor::RgbdFrame& frame, const sensor::Pinhole& 
   if (!frame.color.empty() && (frame.color.type() != CV_8UC3 || frame.color.size() != size)) {
     throw std::invalid_argument("organised_cloud: colour must be CV_8UC3 of the camera's size");
   }
+
+  // Organised: pixels without depth are points as well
   const PointMaker maker(frame, camera, options);
   auto cloud = std::make_shared<Cloud>(static_cast<std::uint32_t>(maker.width()),
                                        static_cast<std::uint32_t>(maker.height()));

@@ -41,6 +41,7 @@ void Surfels::add(const FusedPoint& point, std::uint32_t& surfel_of_point) {
   const Eigen::Vector3f normal = point.point.getNormalVector3fMap();
   if (!normal.allFinite()) return;
 
+  // The block's surfel of similar normal
   const Eigen::Vector3d position = point.point.getVector3fMap().cast<double>();
   const Eigen::Vector3i block = cell_of(position / block_m_);
   std::uint32_t& first = first_.try_emplace(pack_cell(block), kNone).first.value();
@@ -51,6 +52,7 @@ void Surfels::add(const FusedPoint& point, std::uint32_t& surfel_of_point) {
     if (sum.dot(normal) > kSameSurfel * sum.norm()) break;
   }
 
+  // None yet: a new one, at the end of the block's list
   if (at == kNone) {
     at = static_cast<std::uint32_t>(surfels_.size());
     surfels_.emplace_back();
@@ -61,6 +63,8 @@ void Surfels::add(const FusedPoint& point, std::uint32_t& surfel_of_point) {
 
   Surfel& surfel = surfels_[at];
   const Eigen::Vector3f offset = (position - centre(block)).cast<float>();
+
+  // Weighted moments of positions, normals and noise
   surfel.normal_sum += point.weight * normal;
   surfel.first += point.weight * offset;
   surfel.second += point.weight * offset * offset.transpose();
@@ -91,6 +95,8 @@ void Surfels::visit_alike(std::uint32_t first, const Eigen::Vector3f& normal, co
 bool Surfels::set_plane(const Surfel& sums, Surfel& surfel) {
   const float length = sums.normal_sum.norm();
   if (sums.points < kFewest || !(length > 0.0F)) return false;
+
+  // Through the mean, across the mean normal
   const Eigen::Vector3f mean = sums.first / sums.weight;
   const Eigen::Matrix3f covariance = sums.second / sums.weight - mean * mean.transpose();
   surfel.origin = mean;
@@ -110,9 +116,13 @@ void Surfels::measure_noise() {
   constexpr std::size_t kFewSurfels = 50;
   constexpr float kGenerous = 6.0F;
   std::vector<float> shares;
+
+  // Residuals of flat surfels, relative to the modelled noise
   for (const Surfel& surfel : surfels_) {
     if (surfel.flat && surfel.noise2 > 0.0F) shares.push_back(surfel.residual2 / surfel.noise2);
   }
+
+  // Too few to judge: the noise of the model
   noise_share_ = 1.0F;
   if (shares.size() < kFewSurfels) return;
   noise_share_ = std::min(1.0F, kGenerous * std::sqrt(core::median(std::move(shares))));
@@ -121,6 +131,8 @@ void Surfels::measure_noise() {
 void Surfels::fit_plane(Surfel& surfel) const {
   const Eigen::Vector3f own = surfel.normal_sum.normalized();
   Surfel sums;
+
+  // Surfels of similar normal in the blocks around
   for (int k = 0; k < 27; ++k) {
     const Eigen::Vector3i step(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
     const Eigen::Vector3f offset = step.cast<float>() * static_cast<float>(block_m_);
@@ -135,8 +147,11 @@ void Surfels::fit_plane(Surfel& surfel) const {
 void Surfels::fit_planes() {
   for (Surfel& surfel : surfels_) surfel.normal_length = surfel.normal_sum.norm();
   for (Surfel& surfel : surfels_) fit_plane(surfel);
+
+  // The measured noise decides which surfels are flat
   measure_noise();
   for (Surfel& surfel : surfels_) {
+    // A surfel in bent surroundings may be flat by itself
     surfel.flat = surfel.flat && explained(surfel);
     if (!surfel.flat) surfel.flat = set_plane(Surfel(surfel), surfel) && explained(surfel);
   }
@@ -183,6 +198,7 @@ void Surfels::project(std::vector<FusedPoint>& points) const {
       });
     }
 
+    // Only along the normal, and within the noise
     if (!(total > 0.0F)) continue;
     const float most = kMostSigmas * noise_share_ * own.noise_m;
     p.getVector3fMap() += std::clamp(shift / total, -most, most) * own.normal;

@@ -70,20 +70,24 @@ std::vector<VoxelSample> VoxelMap::measured(const Cloud& camera_cloud,
   samples.reserve(camera_cloud.size());
   VoxelSample sample;
   sample.side.robot = robot;
-
   VoxelSide& side = sample.side;
+
   for (const Point& p : camera_cloud.points) {
     if (!(p.z > 0.0F) || !std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) continue;
+
+    // Without normal, the surface faces the camera
     const Eigen::Vector3f position = p.getVector3fMap();
     Eigen::Vector3f normal = p.getNormalVector3fMap();
     const float squared = normal.squaredNorm();
     const bool known = squared > 0.25F && std::isfinite(squared);
     normal = known ? (normal / std::sqrt(squared)).eval() : (-position.normalized()).eval();
 
+    // Depth at grazing incidence is unreliable
     const float cosine = known ? std::abs(normal.dot(position)) / position.norm() : 0.5F;
     if (known && cosine < least_cosine) continue;
     if (!locate(world_from_cloud * position.cast<double>(), options.voxel_m, sample)) continue;
 
+    // Inverse variance of the depth, relative to 1 m
     const double sigma = sensor::depth_sigma(static_cast<double>(p.z));
     const double ratio = unit / sigma;
     side.weight = std::max(cosine, 1e-3F) * static_cast<float>(ratio * ratio);
@@ -123,6 +127,7 @@ std::vector<FusedPoint> VoxelMap::merged(const std::vector<FusedPoint>& points,
     VoxelSample sample;
     if (!locate(p.getVector3fMap().cast<double>(), options.voxel_m, sample)) continue;
 
+    // A fused point is one sample of its weight
     VoxelSide& side = sample.side;
     const Eigen::Vector3f normal = p.getNormalVector3fMap();
     if (normal.allFinite()) {
@@ -142,10 +147,12 @@ std::vector<FusedPoint> VoxelMap::merged(const std::vector<FusedPoint>& points,
     samples.push_back(side);
   }
 
+  // Samples of one voxel next to each other
   std::sort(order.begin(), order.end());
   std::vector<FusedPoint> result;
   result.reserve(samples.size());
 
+  // Both sides of a thin wall may be in one voxel
   for (std::size_t i = 0; i < order.size();) {
     const std::uint64_t key = order[i].first;
     std::array<VoxelSide, 2> sides;
@@ -189,6 +196,7 @@ void VoxelMap::combine(const VoxelSide& sample, std::uint32_t view, VoxelSide& s
     if (squared > 0.0F) side.scatter += distance * distance / squared * side.weight * share;
   }
 
+  // Known normals replace directions to the camera
   if (side.weight == 0.0F || (sample.normal_known != 0 && side.normal_known == 0)) {
     side.normal = sample.normal;
     side.normal_known = sample.normal_known;
@@ -220,6 +228,7 @@ FusedPoint VoxelMap::point_of(std::uint64_t key, const VoxelSide& side, double v
   Point& p = fused.point;
   p.getVector3fMap() = (centre + side.mean.cast<double>()).cast<float>();
 
+  // A normal only if some sample had one
   const bool known = side.normal_known != 0 && side.normal.squaredNorm() > 0.0F;
   p.getNormalVector3fMap() = known
                                  ? side.normal.normalized().eval()
@@ -229,6 +238,7 @@ FusedPoint VoxelMap::point_of(std::uint64_t key, const VoxelSide& side, double v
   p.b = to_byte(static_cast<double>(side.color.z()));
   p.a = 255;
 
+  // Statistics of the samples
   fused.weight = side.weight;
   fused.spread_m = std::sqrt(side.scatter / side.weight);
   fused.noise_m = std::sqrt(side.variance / side.weight);
@@ -239,6 +249,7 @@ FusedPoint VoxelMap::point_of(std::uint64_t key, const VoxelSide& side, double v
 }
 
 std::vector<FusedPoint> VoxelMap::points() const {
+  // Sorted, since a hash map's order is arbitrary
   std::vector<std::pair<std::uint64_t, std::uint32_t>> order(places_.begin(), places_.end());
   std::sort(order.begin(), order.end());
   std::vector<FusedPoint> points;
@@ -259,6 +270,8 @@ void append(const std::vector<FusedPoint>& points, bool robots, FusedCloud& clou
   for (const FusedPoint& p : points) {
     cloud.cloud->points.push_back(p.point);
     cloud.columns.observations.push_back(p.observations);
+
+    // Confidence grows from 0 to 1 with the weight
     cloud.columns.confidence.push_back(p.weight / (p.weight + 1.0F));
     if (robots) cloud.columns.robot.push_back(static_cast<std::uint8_t>(p.robot));
   }

@@ -22,7 +22,7 @@ class ByteReader {
   }
 
   [[nodiscard]] bool open() const { return open_; }
-  /// Bytes of the file that were not handed out yet.
+  /// Bytes of the file that were not read yet.
   [[nodiscard]] std::uint64_t remaining() const { return size_ - given_; }
 
   /// The next `count` bytes, valid until the next call; nullptr when the file does not have them.
@@ -68,6 +68,8 @@ class ByteReader {
 
   bool fill(std::size_t count) {
     if (!open_ || remaining() < count) return false;
+
+    // Unread bytes move to the front
     std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
     end_ -= begin_;
     begin_ = 0;

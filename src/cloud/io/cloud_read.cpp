@@ -16,6 +16,7 @@ core::Result<CloudFile> read_ply_cloud(const std::filesystem::path& file, LargeC
   auto ply = read_ply(file, large == LargeCoordinates::kShifted);
   if (!ply) return tl::unexpected<core::Error>(ply.error());
 
+  // Meaning of each column, by its name
   std::vector<Meaning> meanings;
   std::vector<std::string> names;
   for (const auto& column : ply->columns) {
@@ -56,6 +57,8 @@ core::Result<CloudFile> read_ply_cloud(const std::filesystem::path& file, LargeC
 
 void change_shift(Cloud& cloud, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   if (from == to) return;
+
+  // In double, since shifts are large
   const Eigen::Vector3d step = from - to;
   for (Point& p : cloud.points) {
     p.x = static_cast<float>(static_cast<double>(p.x) + step.x());
@@ -69,6 +72,8 @@ core::Result<void> check_one_frame(const std::string& name, const Eigen::Vector3
                                    const std::string& other_name, const Eigen::Vector3d& other_shift) {
   constexpr double kFloatsHold_m = 10000.0;
   const double apart_m = (shift - other_shift).norm();
+
+  // Farther apart, one shift cannot serve both
   if (apart_m <= kFloatsHold_m) return {};
   return core::input_error(fmt::format(
       "{} and {} lie {:.0f} km apart, and floats are exact to a millimetre only within 10 km; bring "
@@ -83,6 +88,8 @@ core::Result<CloudFile> read_cloud(const std::filesystem::path& file, LargeCoord
     return core::input_error(file.string() + ": is a folder, a cloud file is needed");
   }
   if (core::is_lfs_pointer(file)) return core::input_error(file.string() + ": " + core::kLfsPointer);
+
+  // The ending decides the format
   const std::string ending = core::ending_of(file);
   if (ending == ".ply") return read_ply_cloud(file, large);
   if (ending == ".pcd") return read_pcd_cloud(file, large);

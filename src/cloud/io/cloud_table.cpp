@@ -17,6 +17,7 @@
 namespace plumbline::cloud {
 namespace {
 
+// A point without position and normal; white if the file has no colours.
 Point blank_point(bool color) {
   Point p;
   p.x = p.y = p.z = kNan;
@@ -71,23 +72,24 @@ Meaning meaning_of(const std::string& name) {
       {"robot", Meaning::kRobot},
   }};
 
+  // Names regardless of case
   const std::string lower = core::lower(name);
-
   for (const auto& [known, meaning] : kNames) {
     if (lower == known) return meaning;
   }
 
+  // Other columns keep names that can be written again
   const bool writable = !lower.empty() && lower.size() <= 64 && lower != "_" && lower != "alpha" &&
                         lower != "a" && std::all_of(lower.begin(), lower.end(), [](unsigned char c) {
                           return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.';
                         });
-
   return writable ? Meaning::kOther : Meaning::kNone;
 }
 
 CloudBuilder::CloudBuilder(const std::vector<Meaning>& meanings, const std::vector<std::string>& names,
                            std::size_t points)
     : others_(meanings.size(), nullptr) {
+  // A vector counts only if all of its columns exist
   position_ = holds(meanings, {Meaning::kX, Meaning::kY, Meaning::kZ});
   file_.has_normals = holds(meanings, {Meaning::kNormalX, Meaning::kNormalY, Meaning::kNormalZ});
   file_.has_color = holds(meanings, {Meaning::kPackedColor}) ||
@@ -95,11 +97,13 @@ CloudBuilder::CloudBuilder(const std::vector<Meaning>& meanings, const std::vect
   file_.cloud = std::make_shared<Cloud>();
   if (!position_) return;
 
+  // Columns with a meaning
   file_.cloud->points.assign(points, blank_point(file_.has_color));
   if (holds(meanings, {Meaning::kConfidence})) file_.columns.confidence.resize(points);
   if (holds(meanings, {Meaning::kObservations})) file_.columns.observations.resize(points);
   if (holds(meanings, {Meaning::kRobot})) file_.columns.robot.resize(points);
 
+  // Further columns, each name once
   for (std::size_t c = 0; c < meanings.size(); ++c) {
     if (meanings[c] != Meaning::kOther) continue;
     auto& others = file_.columns.others;
@@ -171,6 +175,8 @@ void CloudBuilder::take_shift() {
   for (int k = 0; k < 3; ++k) {
     const std::vector<double>& wide = wide_[static_cast<std::size_t>(k)];
     if (wide.empty()) continue;
+
+    // The differences fit floats
     file_.shift[k] = axis_shift(wide);
     for (std::size_t i = 0; i < wide.size(); ++i)
       file_.cloud->points[i].data[k] = static_cast<float>(wide[i] - file_.shift[k]);
@@ -194,6 +200,8 @@ CloudFile CloudBuilder::finish() {
   for (Point& p : file_.cloud->points) {
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) ++file_.nan_points;
     if (!file_.has_normals) continue;
+
+    // Normals without direction become NaN
     const float squared = p.normal_x * p.normal_x + p.normal_y * p.normal_y + p.normal_z * p.normal_z;
     if (std::isfinite(squared) && squared > 0.0F) continue;
     p.normal_x = p.normal_y = p.normal_z = kNan;

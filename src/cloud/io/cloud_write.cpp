@@ -18,6 +18,7 @@
 namespace plumbline::cloud {
 namespace {
 
+// Throws if a column has another length than the cloud.
 void check_columns(const Cloud& cloud, const CloudColumns& columns) {
   const auto fits = [&cloud](std::size_t n) { return n == 0 || n == cloud.size(); };
   if (!fits(columns.confidence.size()) || !fits(columns.observations.size()) || !fits(columns.robot.size()) ||
@@ -54,13 +55,18 @@ core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& clo
   core::OutputFile out(file);
   out.write("ply\nformat binary_little_endian 1.0\ncomment plumbline, metres\n");
   for (const std::string& comment : comments) out.write("comment " + comment + "\n");
+
+  // Points that are not finite are left out
   out.write(fmt::format("element vertex {}\n", count_finite(cloud)));
+
+  // Shifted positions need doubles
   const char* type = shift.isZero(0.0) ? "float" : "double";
   out.write(fmt::format("property {0} x\nproperty {0} y\nproperty {0} z\n", type));
   out.write(
       "property float nx\nproperty float ny\nproperty float nz\n"
       "property uchar red\nproperty uchar green\nproperty uchar blue\n");
 
+  // Only columns that the cloud has
   if (!columns.confidence.empty()) out.write("property float confidence\n");
   if (!columns.observations.empty()) out.write("property int observations\n");
   if (!columns.robot.empty()) out.write("property uchar robot\n");
@@ -70,6 +76,8 @@ core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& clo
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const Point& p = cloud[i];
     if (!finite(p)) continue;
+
+    // An unknown normal is written as zero
     const bool normal = std::isfinite(p.normal_x + p.normal_y + p.normal_z);
     put_position(p, shift, out);
     out.put(normal ? std::array<float, 3>{p.normal_x, p.normal_y, p.normal_z} : std::array<float, 3>{});
@@ -89,8 +97,9 @@ core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& clo
   std::string fields = "x y z rgb normal_x normal_y normal_z curvature";
   std::string sizes = shift.isZero(0.0) ? "4 4 4 4 4 4 4 4" : "8 8 8 4 4 4 4 4";
   std::string types = "F F F F F F F F";
-
   std::string counts = "1 1 1 1 1 1 1 1";
+
+  // Columns follow the fields of a point
   const auto field = [&](bool present, const std::string& name, const char* size, const char* type) {
     if (!present) return;
     fields += " " + name;
@@ -104,6 +113,7 @@ core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& clo
   field(!columns.robot.empty(), "robot", "1", "U");
   for (const auto& other : columns.others) field(true, other.name, "4", "F");
 
+  // The viewpoint, with its shift
   core::OutputFile out(file);
   const auto& t = cloud.sensor_origin_;
   const auto& q = cloud.sensor_orientation_;
@@ -119,6 +129,7 @@ core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& clo
       fields, sizes, types, counts, organised ? cloud.width : points, organised ? cloud.height : 1, origin(0),
       origin(1), origin(2), q.w(), q.x(), q.y(), q.z(), points));
 
+  // Organised clouds keep points without position
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const Point& p = cloud[i];
     if (!organised && !finite(p)) continue;
@@ -135,6 +146,7 @@ core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& clo
 core::Result<void> write_cloud(const std::filesystem::path& file, const Cloud& cloud,
                                const CloudColumns& columns, const Eigen::Vector3d& shift,
                                const std::vector<std::string>& comments) {
+  // The ending decides the format
   const std::string ending = core::ending_of(file);
   if (ending == ".ply") return write_ply(file, cloud, columns, shift, comments);
   if (ending == ".pcd") return write_pcd(file, cloud, columns, shift, comments);

@@ -35,6 +35,7 @@ CloudFrame frame_in(const std::vector<std::string>& comments) {
     const std::size_t begin = comment.find_first_not_of(' ', kKey.size());
     if (begin == std::string::npos) continue;
 
+    // Long or unprintable text is reduced to its up axis
     CloudFrame frame{comment.substr(begin, comment.find_last_not_of(" \t\r") + 1 - begin)};
     const bool plain = frame.text.size() <= kLongest &&
                        std::all_of(frame.text.begin(), frame.text.end(),
@@ -46,6 +47,7 @@ CloudFrame frame_in(const std::vector<std::string>& comments) {
 
 core::Result<void> check_same_up(const std::string& name, const CloudFrame& frame,
                                  const std::string& other_name, const CloudFrame& other) {
+  // An unknown frame is not refused
   const Up up = frame.up();
   const Up other_up = other.up();
   if (up == Up::kUnknown || other_up == Up::kUnknown || up == other_up) return {};

@@ -84,14 +84,16 @@ PlyData dressed(const std::vector<Eigen::Vector3f>& vertices, const pcl::Polygon
   std::array<std::vector<float>, 6> xyz_normal;
   std::array<std::vector<std::uint8_t>, 3> rgb;
   pcl::Indices near;
-
   std::vector<float> squared;
+
+  // Poisson's surface far from points was never seen
   for (std::size_t v = 0; v < vertices.size(); ++v) {
     Point at;
     at.getVector3fMap() = vertices[v];
     const int found = tree.nearestKSearch(at, kNeighbours, near, squared);
     if (found == 0 || !(squared[0] <= static_cast<float>(reach_m * reach_m))) continue;
 
+    // Mean normal and colour of the nearest points
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();
     Eigen::Vector3f color = Eigen::Vector3f::Zero();
     for (const int i : near) {
@@ -110,6 +112,7 @@ PlyData dressed(const std::vector<Eigen::Vector3f>& vertices, const pcl::Polygon
     }
   }
 
+  // Columns, and triangles of the remaining vertices
   PlyData result;
   const std::array<const char*, 6> names{"x", "y", "z", "nx", "ny", "nz"};
   for (std::size_t k = 0; k < 6; ++k) result.add(names[k], std::move(xyz_normal[k]));
@@ -127,6 +130,7 @@ core::Result<void> write_obj(const std::filesystem::path& file, const PlyData& m
   core::OutputFile out(file);
   out.write("# metres; x y z red green blue\n");
 
+  // A vertex with its colour, then its normal
   for (std::size_t v = 0; v < mesh.vertex_count; ++v) {
     const auto at = [&](std::size_t k) {
       const float value = (*columns[k])[v];
@@ -134,10 +138,12 @@ core::Result<void> write_obj(const std::filesystem::path& file, const PlyData& m
       return shift == 0.0 ? static_cast<double>(value) : with_shift(value, shift);
     };
     const auto channel = [v](const std::vector<std::uint8_t>& c) { return c[v] / 255.0; };
+
     out.write(fmt::format("v {:.5f} {:.5f} {:.5f} {:.4f} {:.4f} {:.4f}\nvn {:.4f} {:.4f} {:.4f}\n", at(0),
                           at(1), at(2), channel(*red), channel(*green), channel(*blue), at(3), at(4), at(5)));
   }
 
+  // OBJ counts vertices from 1
   for (const auto& [a, b, c] : mesh.triangles) {
     out.write(fmt::format("f {0}//{0} {1}//{1} {2}//{2}\n", a + 1, b + 1, c + 1));
   }
@@ -155,6 +161,8 @@ void MeshOptions::declare(core::OptionTable& table) {
 
 core::Result<PlyData> make_mesh(const Cloud& cloud, const MeshOptions& options) {
   constexpr std::size_t kFewest = 100;
+
+  // Poisson's method needs oriented normals
   const std::shared_ptr<Cloud> points = oriented(cloud);
   if (points->size() < kFewest) {
     return core::usage_error(fmt::format("mesh: {} points with normals are too few; {} are needed at least",

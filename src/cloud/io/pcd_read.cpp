@@ -43,6 +43,7 @@ struct PcdHeader {
 std::string finish_fields(PcdHeader& header) {
   if (header.fields.empty()) return "has no FIELDS line";
   for (auto& field : header.fields) {
+    // The scalar type follows from SIZE and TYPE
     const auto t = field.type;
     switch (field.size) {
       case 1:
@@ -62,6 +63,7 @@ std::string finish_fields(PcdHeader& header) {
         return fmt::format("field '{}' has SIZE {}, allowed are 1, 2, 4 and 8", field.name, field.size);
     }
 
+    // Combinations that PCD does not have
     if (t != 'F' && t != 'U' && t != 'I')
       return fmt::format("field '{}' has TYPE {}, not F, U or I", field.name, t);
     if (t == 'F' && field.size < 4)
@@ -69,6 +71,7 @@ std::string finish_fields(PcdHeader& header) {
     if (field.count == 0 || field.count > 65536)
       return fmt::format("field '{}' has COUNT {}", field.name, field.count);
 
+    // Only single values have a meaning
     field.offset = header.record;
     header.record += field.size * field.count;
     header.elements += field.count;
@@ -76,6 +79,7 @@ std::string finish_fields(PcdHeader& header) {
     if (field.meaning == Meaning::kPackedColor && field.size != 4) field.meaning = Meaning::kNone;
   }
 
+  // POINTS may be missing
   if (header.points == 0) header.points = header.width * header.height;
   if (header.width != 0 && header.width * header.height != header.points) {
     return fmt::format("WIDTH {} x HEIGHT {} is not POINTS {}", header.width, header.height, header.points);
@@ -127,6 +131,7 @@ std::string parse_line(const std::string& key, std::istringstream& words, PcdHea
     return known ? "" : "DATA '" + word + "' is not ascii, binary or binary_compressed";
   }
 
+  // The other words have one number each
   const auto number = parse_count(word);
   if (key != "WIDTH" && key != "HEIGHT" && key != "POINTS")
     return "'" + key.substr(0, 40) + "' is not a PCD header word";
@@ -144,12 +149,14 @@ core::Result<PcdHeader> read_header(ByteReader& reader) {
     std::string key;
     if (!(words >> key)) continue;
 
+    // Comments may name the frame
     if (key[0] == '#') {
       const std::size_t text = line.find_first_not_of("# ");
       if (text != std::string::npos) header.comments.push_back(line.substr(text));
       continue;
     }
 
+    // All fields are known at DATA, the last line
     std::string problem = parse_line(key, words, header);
     if (problem.empty() && key == "DATA") problem = finish_fields(header);
     if (!problem.empty()) return core::input_error(fmt::format("line {}: {}", number, problem));
@@ -161,6 +168,8 @@ core::Result<PcdHeader> read_header(ByteReader& reader) {
 void set_binary(CloudBuilder& builder, std::size_t row, const PcdHeader& header, std::size_t f,
                 const std::uint8_t* bytes) {
   const PcdField& field = header.fields[f];
+
+  // Packed colour: the bits, even of a float
   if (field.meaning == Meaning::kPackedColor) {
     std::uint32_t bits = 0;
     std::memcpy(&bits, bytes, 4);
@@ -174,6 +183,7 @@ std::string truncated(std::uint64_t row, std::uint64_t points) {
   return fmt::format("the file ends in point {} of {}; it is truncated", row + 1, points);
 }
 
+// Points as records of bytes; "" or the problem.
 std::string read_binary(ByteReader& reader, const PcdHeader& header, CloudBuilder& builder) {
   for (std::uint64_t row = 0; row < header.points; ++row) {
     const std::uint8_t* record = reader.take(static_cast<std::size_t>(header.record));
@@ -216,6 +226,8 @@ class PcdWords {
       pieces_.push_back(text.substr(begin, end - begin));
       begin = end + 1;
     }
+
+    // Commas are decimal unless the word is a point
     decimal_comma_ = pieces_.size() > 1 && pieces_.size() != a_point_;
     return true;
   }
@@ -233,16 +245,16 @@ std::string read_ascii(ByteReader& reader, const PcdHeader& header, CloudBuilder
   for (std::uint64_t row = 0; row < header.points; ++row) {
     for (std::size_t f = 0; f < header.fields.size(); ++f) {
       const PcdField& field = header.fields[f];
-
       for (std::uint64_t k = 0; k < field.count; ++k) {
         if (!words.next(word)) return truncated(row, header.points);
 
+        // Decimal commas would make two numbers of one
         if (words.decimal_comma())
           return fmt::format("point {}: decimal comma; write numbers with a point", row + 1);
-
         const auto value = parse_number(word);
         if (!value) return fmt::format("point {}: '{}' is not a number", row + 1, word);
 
+        // Packed colour: a number, or the bits of a float
         if (field.meaning != Meaning::kPackedColor) {
           builder.set(row, field.meaning, f, *value);
         } else if (field.scalar == ScalarType::kFloat32) {
@@ -265,11 +277,13 @@ std::string read_compressed(ByteReader& reader, const PcdHeader& header, CloudBu
   const std::uint8_t* sizes = reader.take(8);
   if (sizes == nullptr) return "the file ends before its compressed data; it is truncated";
 
+  // Sizes of the compressed and the uncompressed data
   std::uint32_t packed_size = 0;
   std::uint32_t size = 0;
   std::memcpy(&packed_size, sizes, 4);
   std::memcpy(&size, sizes + 4, 4);
 
+  // Sizes are compared before memory is allocated
   if (size != header.points * header.record) {
     return fmt::format("compressed data hold {} bytes, {} points need {}", size, header.points,
                        header.points * header.record);
@@ -286,6 +300,7 @@ std::string read_compressed(ByteReader& reader, const PcdHeader& header, CloudBu
     return "compressed data are damaged";
   }
 
+  // Each field for all points
   for (std::size_t f = 0; f < header.fields.size(); ++f) {
     const PcdField& field = header.fields[f];
     const std::uint8_t* column = bytes.data() + field.offset * header.points;
@@ -323,11 +338,13 @@ core::Result<CloudFile> read_pcd_cloud(const std::filesystem::path& file, LargeC
   ByteReader reader(file);
   if (!reader.open()) return error("cannot be read");
 
+  // The header must fit the file's size
   const auto header = read_header(reader);
   if (!header) return error(header.error().message);
   std::string problem = check_size(*header, reader.remaining());
   if (!problem.empty()) return error(problem);
 
+  // The builder allocates only columns with a meaning
   std::vector<Meaning> meanings;
   std::vector<std::string> names;
   for (const auto& field : header->fields) {
@@ -338,6 +355,7 @@ core::Result<CloudFile> read_pcd_cloud(const std::filesystem::path& file, LargeC
   CloudBuilder builder(meanings, names, static_cast<std::size_t>(header->points));
   if (!builder.has_position()) return error("has no x, y and z; it is not a point cloud");
 
+  // Digits that floats would lose
   for (const PcdField& field : header->fields) {
     const bool digits = header->data == "ascii" || exceeds_float(field.scalar);
     if (digits && large == LargeCoordinates::kShifted) builder.keep_digits(field.meaning);
@@ -352,12 +370,15 @@ core::Result<CloudFile> read_pcd_cloud(const std::filesystem::path& file, LargeC
   }
   if (!problem.empty()) return error(problem);
 
+  // Several rows: an organised cloud
   const bool organised = header->width != 0 && header->height > 1;
   builder.shape(static_cast<std::uint32_t>(organised ? header->width : header->points),
                 static_cast<std::uint32_t>(organised ? header->height : 1));
 
   CloudFile result = builder.finish();
   result.frame = frame_in(header->comments);
+
+  // The viewpoint is shifted like the points
   if (const auto& v = header->viewpoint; v.size() == 7) {
     result.cloud->sensor_origin_ =
         (Eigen::Vector4d(v[0], v[1], v[2], 0.0) -

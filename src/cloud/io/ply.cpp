@@ -36,6 +36,8 @@ class Body {
   bool list(const PlyProperty& property) {
     double count = 0.0;
     if (!scalar(property.count_type, count)) return false;
+
+    // A damaged length must not allocate memory
     if (!(count >= 0.0) || count != std::floor(count)) return refuse("list length is not a natural number");
     if (count > kLongestList)
       return refuse("list with more than 65536 items; the file is damaged or no mesh: export it again");
@@ -103,6 +105,7 @@ std::vector<Sink> make_columns(const PlyElement& element, PlyData& data) {
   std::vector<Sink> sinks;
   std::size_t offset = 0;
 
+  // Bytes remain bytes, all others become floats
   for (const auto& property : element.properties) {
     if (property.list) continue;
     if (property.type == ScalarType::kUint8) {
@@ -110,10 +113,12 @@ std::vector<Sink> make_columns(const PlyElement& element, PlyData& data) {
     } else {
       data.columns.push_back({property.name, std::vector<float>(count)});
     }
+
     sinks.push_back({property.type, offset, nullptr, nullptr});
     offset += size_of(property.type);
   }
 
+  // Addresses of the columns, once all exist
   for (std::size_t i = 0; i < sinks.size(); ++i) {
     auto& values = data.columns[i].values;
     if (auto* floats = std::get_if<std::vector<float>>(&values)) sinks[i].floats = floats->data();
@@ -136,7 +141,7 @@ void divert_positions(const PlyElement& element, bool ascii, const PlyData& data
   }
 }
 
-/// Back into the columns, less a shift.
+/// Stores the positions in the columns, with a shift subtracted.
 void store_positions(const WidePositions& wide, const std::vector<Sink>& sinks, PlyData& data) {
   for (std::size_t axis = 0; axis < wide.size(); ++axis) {
     if (wide[axis].empty()) continue;
@@ -170,12 +175,14 @@ std::uint64_t read_records(Body& body, const PlyElement& element, const Visit& v
 /// Returns how many vertices were read.
 std::uint64_t fill_columns(Body& body, const PlyElement& element, const std::vector<Sink>& sinks,
                            const PlyData& data) {
+  // Records of equal size are read as blocks
   if (!body.ascii() && !has_lists(element)) {
     const std::size_t size = element.least_size(false);
     for (std::size_t row = 0; row < data.vertex_count; ++row) {
       const std::uint8_t* record = body.reader().take(size);
       if (record == nullptr) return row;
 
+      // The usual types, without conversion
       for (const Sink& sink : sinks) {
         if (sink.type == ScalarType::kFloat32 && !body.swap()) {
           std::memcpy(sink.floats + row, record + sink.offset, 4);
@@ -190,6 +197,7 @@ std::uint64_t fill_columns(Body& body, const PlyElement& element, const std::vec
     return data.vertex_count;
   }
 
+  // Text and lists, value by value
   std::size_t column = 0;
   return read_records(body, element, [&](std::uint64_t row, const PlyProperty& property, double value) {
     if (!property.list) store(sinks[column++ % sinks.size()], static_cast<std::size_t>(row), value);
@@ -200,6 +208,8 @@ std::uint64_t fill_columns(Body& body, const PlyElement& element, const std::vec
 std::uint64_t read_vertices(Body& body, const PlyElement& element, bool take_shift, PlyData& data) {
   std::vector<Sink> sinks = make_columns(element, data);
   WidePositions wide;
+
+  // The shift follows from all positions as doubles
   if (take_shift) divert_positions(element, body.ascii(), data, sinks, wide);
   const std::uint64_t rows = fill_columns(body, element, sinks, data);
   if (rows == element.count) store_positions(wide, sinks, data);
@@ -220,6 +230,8 @@ bool add_polygon(Body& body, const std::vector<double>& corners, PlyData& data) 
       return body.refuse(fmt::format("vertex index {} is not below {}", corners[i], data.vertex_count));
     }
   }
+
+  // A fan of triangles around the first corner
   for (std::size_t i = 2; i < indices.size(); ++i)
     data.triangles.push_back({indices[0], indices[i - 1], indices[i]});
   return true;
@@ -238,12 +250,15 @@ std::uint64_t read_edges(Body& body, const PlyElement& element, PlyData& data) {
                                    [](const auto& property) { return property.name == "red"; });
   data.edges.resize(count);
   data.edge_colors.resize(colored ? count : 0);
+
+  // Edges must join vertices that exist
   return read_records(body, element, [&](std::uint64_t row, const PlyProperty& property, double value) {
     const bool first = property.name == "vertex1";
     if ((first || property.name == "vertex2") &&
         !to_index(value, data.vertex_count, data.edges[row][first ? 0 : 1])) {
       return body.refuse(fmt::format("vertex index {} is not below {}", value, data.vertex_count));
     }
+
     for (std::size_t k = 0; k < 3 && colored; ++k) {
       constexpr std::array<const char*, 3> kChannels{"red", "green", "blue"};
       if (property.name == kChannels[k]) data.edge_colors[row][k] = to_byte(value);
@@ -259,12 +274,14 @@ std::string read_element(Body& body, const PlyElement& element, bool take_shift,
   const std::uint64_t room = body.reader().remaining() + (body.ascii() ? 1 : 0);
   if (element.count > 0 && least == 0) return fmt::format("element '{}' has no properties", element.name);
 
+  // A false promise must not allocate memory
   if (element.count > 0 && element.count > room / least) {
     return fmt::format(
         "header promises {} of '{}' (at least {} bytes each) but {} bytes are left; the file is truncated",
         element.count, element.name, least, body.reader().remaining());
   }
 
+  // Other elements are passed over
   std::uint64_t rows = 0;
   if (element.name == "vertex") {
     rows = read_vertices(body, element, take_shift, data);
@@ -279,6 +296,60 @@ std::string read_element(Body& body, const PlyElement& element, bool take_shift,
   if (rows == element.count) return "";
   const std::string place = fmt::format("'{}' {} of {}: ", element.name, rows + 1, element.count);
   return place + (body.problem().empty() ? "the file ends here; it is truncated" : body.problem());
+}
+
+/// Columns of different lengths are an error of the caller.
+void check_lengths(const PlyData& data) {
+  for (const auto& column : data.columns) {
+    const std::size_t length = std::visit([](const auto& v) { return v.size(); }, column.values);
+    if (length != data.vertex_count)
+      throw std::invalid_argument("PLY column '" + column.name + "' has another length");
+  }
+  if (!data.edge_colors.empty() && data.edge_colors.size() != data.edges.size())
+    throw std::invalid_argument("PLY edge colours");
+}
+
+/// Offset of a column's numbers; only positions are shifted, and written as doubles.
+double shift_of(const PlyData& data, const PlyColumn& column) {
+  const bool position = column.name == "x" || column.name == "y" || column.name == "z";
+  return position ? data.shift[static_cast<std::size_t>(column.name[0] - 'x')] : 0.0;
+}
+
+/// Elements in the order in which their records follow.
+std::string header_of(const PlyData& data) {
+  std::string text = "ply\nformat binary_little_endian 1.0\n";
+  for (const auto& comment : data.comments) text += "comment " + comment + "\n";
+  text += fmt::format("element vertex {}\n", data.vertex_count);
+
+  for (const auto& column : data.columns) {
+    const bool floats = std::holds_alternative<std::vector<float>>(column.values);
+    const char* type = !floats ? "uchar" : shift_of(data, column) != 0.0 ? "double" : "float";
+    text += fmt::format("property {} {}\n", type, column.name);
+  }
+
+  // Empty elements are left out
+  if (!data.triangles.empty())
+    text += fmt::format("element face {}\nproperty list uchar int vertex_indices\n", data.triangles.size());
+  if (!data.edges.empty()) {
+    text += fmt::format("element edge {}\nproperty int vertex1\nproperty int vertex2\n", data.edges.size());
+    if (!data.edge_colors.empty()) text += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  }
+  return text + "end_header\n";
+}
+
+/// Vertices with their absolute positions.
+void put_vertices(const PlyData& data, core::OutputFile& out) {
+  for (std::size_t row = 0; row < data.vertex_count; ++row) {
+    for (const auto& column : data.columns) {
+      const auto* floats = std::get_if<std::vector<float>>(&column.values);
+      const double shift = floats != nullptr ? shift_of(data, column) : 0.0;
+      if (shift != 0.0) {
+        out.put(with_shift((*floats)[row], shift));
+      } else {
+        std::visit([&out, row](const auto& values) { out.put(values[row]); }, column.values);
+      }
+    }
+  }
 }
 
 }  // namespace
@@ -316,6 +387,8 @@ core::Result<PlyData> read_ply(const std::filesystem::path& file, bool take_shif
   PlyData data;
   data.comments = header->comments;
   Body body(reader, header->format);
+
+  // Elements follow in the order of the header
   for (const auto& element : header->elements) {
     const std::string problem = read_element(body, element, take_shift, data);
     if (!problem.empty()) return core::input_error(file.string() + ": " + problem);
@@ -324,57 +397,12 @@ core::Result<PlyData> read_ply(const std::filesystem::path& file, bool take_shif
 }
 
 core::Result<void> write_ply(const std::filesystem::path& file, const PlyData& data) {
-  for (const auto& column : data.columns) {
-    const std::size_t length = std::visit([](const auto& v) { return v.size(); }, column.values);
-    if (length != data.vertex_count)
-      throw std::invalid_argument("PLY column '" + column.name + "' has another length");
-  }
-
-  const bool colored = !data.edge_colors.empty();
-  if (colored && data.edge_colors.size() != data.edges.size())
-    throw std::invalid_argument("PLY edge colours");
-
+  check_lengths(data);
   core::OutputFile out(file);
-  out.write("ply\nformat binary_little_endian 1.0\n");
-  for (const auto& comment : data.comments) out.write("comment " + comment + "\n");
-  out.write(fmt::format("element vertex {}\n", data.vertex_count));
+  out.write(header_of(data));
+  put_vertices(data, out);
 
-  const auto shift_of = [&data](const PlyColumn& column) {
-    const bool position = column.name == "x" || column.name == "y" || column.name == "z";
-    return position ? data.shift[static_cast<std::size_t>(column.name[0] - 'x')] : 0.0;
-  };
-
-  for (const auto& column : data.columns) {
-    const bool floats = std::holds_alternative<std::vector<float>>(column.values);
-    const char* type = !floats ? "uchar" : shift_of(column) != 0.0 ? "double" : "float";
-    out.write(fmt::format("property {} {}\n", type, column.name));
-  }
-
-  if (!data.triangles.empty()) {
-    out.write(
-        fmt::format("element face {}\nproperty list uchar int vertex_indices\n", data.triangles.size()));
-  }
-
-  if (!data.edges.empty()) {
-    out.write(
-        fmt::format("element edge {}\nproperty int vertex1\nproperty int vertex2\n", data.edges.size()));
-    if (colored) out.write("property uchar red\nproperty uchar green\nproperty uchar blue\n");
-  }
-
-  out.write("end_header\n");
-
-  for (std::size_t row = 0; row < data.vertex_count; ++row) {
-    for (const auto& column : data.columns) {
-      const auto* floats = std::get_if<std::vector<float>>(&column.values);
-      const double shift = floats != nullptr ? shift_of(column) : 0.0;
-      if (shift != 0.0) {
-        out.put(with_shift((*floats)[row], shift));
-      } else {
-        std::visit([&out, row](const auto& values) { out.put(values[row]); }, column.values);
-      }
-    }
-  }
-
+  // Triangles are lists of three
   for (const auto& triangle : data.triangles) {
     out.put(std::uint8_t{3});
     out.put(triangle);
@@ -382,7 +410,7 @@ core::Result<void> write_ply(const std::filesystem::path& file, const PlyData& d
 
   for (std::size_t i = 0; i < data.edges.size(); ++i) {
     out.put(data.edges[i]);
-    if (colored) out.put(data.edge_colors[i]);
+    if (!data.edge_colors.empty()) out.put(data.edge_colors[i]);
   }
 
   return out.commit();

@@ -11,6 +11,7 @@ namespace {
 constexpr std::size_t kLongestLine = 4096;
 constexpr int kMostLines = 2000;
 
+// Scalar type by its old or its new name.
 std::optional<ScalarType> scalar_type(const std::string& name) {
   if (name == "char" || name == "int8") return ScalarType::kInt8;
   if (name == "uchar" || name == "uint8") return ScalarType::kUint8;
@@ -25,6 +26,7 @@ std::optional<ScalarType> scalar_type(const std::string& name) {
   return std::nullopt;
 }
 
+// The format line; "" or the problem, as for the lines below.
 std::string parse_format(std::istringstream& words, PlyHeader& header) {
   std::string name;
   std::string version;
@@ -47,6 +49,8 @@ std::string parse_element(std::istringstream& words, PlyHeader& header) {
   words >> element.name >> count;
   const auto number = parse_count(count);
   if (element.name.empty() || !number) return "element needs a name and a count";
+
+  // Elements are found by name
   for (const auto& other : header.elements) {
     if (other.name == element.name) return "element '" + element.name + "' is there twice";
   }
@@ -61,6 +65,7 @@ std::string parse_property(std::istringstream& words, PlyHeader& header) {
   std::string type;
   words >> type;
 
+  // A list has a type for its length as well
   if (type == "list") {
     property.list = true;
     std::string count_type;
@@ -77,12 +82,12 @@ std::string parse_property(std::istringstream& words, PlyHeader& header) {
   if (!items) return "property type '" + type + "' is not known";
   if (property.name.empty()) return "property without a name";
 
+  // Columns are found by name, which must be unique
   property.type = *items;
   auto& properties = header.elements.back().properties;
   for (const auto& other : properties) {
     if (other.name == property.name) return "property '" + property.name + "' is there twice";
   }
-
   properties.push_back(std::move(property));
   return "";
 }
@@ -104,17 +109,18 @@ core::Result<PlyHeader> read_ply_header(ByteReader& reader) {
     words >> keyword;
     std::string problem;
 
+    // The header is complete
     if (keyword == "end_header") {
       if (!format) return core::input_error("PLY header has no format line");
       return header;
     }
 
+    // Comments are kept, obj_info is not
     if (keyword == "format") {
       problem = parse_format(words, header);
       format = true;
     } else if (keyword == "comment" || keyword == "obj_info") {
       const auto text = line.find_first_not_of(' ', line.find(keyword) + keyword.size());
-
       if (keyword == "comment") header.comments.push_back(text == std::string::npos ? "" : line.substr(text));
     } else if (keyword == "element") {
       problem = parse_element(words, header);

@@ -60,6 +60,7 @@ inline std::size_t size_of(ScalarType type) {
   return with_type(type, [](auto value) { return sizeof(value); });
 }
 
+// A scalar from bytes that need not be aligned.
 inline double load(ScalarType type, const std::uint8_t* bytes, bool big_endian) {
   return with_type(type, [&](auto value) {
     std::array<std::uint8_t, sizeof(value)> raw{};

@@ -18,6 +18,8 @@ double axis_shift(const std::vector<double>& values) {
   constexpr std::size_t kSamples = 1000;
   constexpr double kFloatsHold = 1000.0;  // metres, to a sixteenth of a millimetre
   constexpr double kLargest = 1e15;       // beyond, whole units are not exact either
+
+  // A sample suffices, since the shift is rounded
   std::vector<double> sample;
   const std::size_t step = std::max<std::size_t>(1, values.size() / kSamples);
   for (std::size_t i = 0; i < values.size(); i += step) {
@@ -35,6 +37,8 @@ std::optional<int> axis_of_column(Meaning meaning) {
 
 double with_shift(float value, double shift) {
   if (!std::isfinite(value)) return static_cast<double>(value);
+
+  // The float's decimal digits, not its binary value
   std::array<char, 64> text{};
   const auto written = std::to_chars(text.data(), text.data() + text.size(), value);
   double decimal = static_cast<double>(value);

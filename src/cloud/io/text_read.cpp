@@ -14,6 +14,7 @@
 namespace plumbline::cloud {
 namespace {
 
+// Words between separators; empty ones are left out.
 std::vector<std::string> split(const std::string& line, std::string_view separators = " \t,;") {
   std::vector<std::string> words;
   std::string word;
@@ -43,6 +44,7 @@ std::string read_table(ByteReader& reader, TextTable& table) {
     if (core::has_decimal_comma(split(line, " \t;")))
       return fmt::format("line {}: decimal comma; write numbers with a point", number);
 
+    // The first line may name the columns
     const bool first = table.columns == 0;
     if (first && !parse_number(words[0])) {
       if (!table.names.empty()) return fmt::format("line {}: '{}' is not a number", number, words[0]);
@@ -54,6 +56,7 @@ std::string read_table(ByteReader& reader, TextTable& table) {
       continue;  // .pts files begin with the number of points
     if (first) table.columns = words.size();
 
+    // Every line must have the same columns
     if (words.size() != table.columns) {
       return fmt::format("line {}: {} columns, the lines before have {}", number, words.size(),
                          table.columns);
@@ -81,6 +84,7 @@ bool is_path(const TextTable& table) {
   return true;
 }
 
+// True if three columns hold only whole numbers from 0 to 255.
 bool looks_like_color(const TextTable& table, std::size_t from) {
   for (std::size_t i = 0; i < table.values.size(); i += table.columns) {
     for (std::size_t c = from; c < from + 3; ++c) {
@@ -131,17 +135,21 @@ core::Result<CloudFile> read_text_cloud(const std::filesystem::path& file, Large
   TextTable table;
   const std::string problem = read_table(reader, table);
   if (!problem.empty()) return error(problem);
+
+  // A trajectory would pass as a cloud
   if (is_path(table)) {
     return error(
         "is a path, not a cloud (a stamp, a position and a quaternion in each line); name a cloud or the "
         "result folder");
   }
 
+  // Meaning of the columns, by name or by their values
   const auto meanings = meanings_of(table);
   table.names.resize(table.columns);
   CloudBuilder builder(meanings, table.names, table.values.size() / table.columns);
   if (!builder.has_position()) return error("has no x, y and z; three columns at least are needed");
 
+  // Digits that floats would lose
   if (large == LargeCoordinates::kShifted) {
     for (const Meaning meaning : meanings) builder.keep_digits(meaning);
   }

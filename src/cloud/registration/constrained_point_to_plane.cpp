@@ -30,6 +30,8 @@ std::vector<Match> matches_of(const SurfaceCloud& source, const SurfaceCloud& ta
     const SurfacePoint& s = source[static_cast<std::size_t>(c.index_query)];
     const SurfacePoint& t = target[static_cast<std::size_t>(c.index_match)];
     const Eigen::Vector3d point = s.getVector3fMap().cast<double>();
+
+    // The mean of both normals, the noise of both points
     const Eigen::Vector3d normal =
         (s.getNormalVector3fMap() + t.getNormalVector3fMap()).cast<double>().normalized();
     const double inverse_sigma =
@@ -84,12 +86,14 @@ PlaneStep ConstrainedPointToPlane::step(const SurfaceCloud& source, const Surfac
   const std::vector<Match> matches = matches_of(source, target, correspondences);
   if (matches.empty()) return found;
 
+  // Rotations about the centre, comparable with translations
   found.centre = middle_of(matches);
   found.lever = std::max(0.1, spread_of(matches, found.centre));
   const double scale = scale_of(matches);
   Matrix6d h = Matrix6d::Zero();
   Vector6d g = Vector6d::Zero();
 
+  // Normal equations with a robust loss
   double weights = 0.0, squares = 0.0;
   for (const Match& m : matches) {
     const double ratio = std::abs(m.distance) / scale;
@@ -106,11 +110,13 @@ PlaneStep ConstrainedPointToPlane::step(const SurfaceCloud& source, const Surfac
     ++found.inliers;
   }
 
+  // Principal directions of the information
   found.rms = found.inliers > 0 ? std::sqrt(squares / found.inliers) : 0.0;
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(h);
   found.eigenvalues = eigen.eigenvalues();
   found.directions = eigen.eigenvectors();
 
+  // No step along directions that are not observable
   Vector6d step = Vector6d::Zero();
   for (int i = 0; i < 6; ++i) {
     found.held[static_cast<std::size_t>(i)] = found.eigenvalues(i) > min_information_ * weights;
@@ -118,6 +124,7 @@ PlaneStep ConstrainedPointToPlane::step(const SurfaceCloud& source, const Surfac
     step -= found.directions.col(i) * (found.directions.col(i).dot(g) / found.eigenvalues(i));
   }
 
+  // From the centre and the lever to the frame
   step.tail<3>() /= found.lever;
   step.head<3>() -= step.tail<3>().cross(found.centre);
   found.transformation = geometry::exp_se3(step).isometry().matrix();

@@ -14,7 +14,7 @@
 namespace plumbline::cloud {
 namespace {
 
-/// The way a surface faces, and the block that a point lies in.
+/// Direction that a surface faces, and the block of a point.
 using Part = std::array<int, 4>;
 
 Part part_of(const SurfacePoint& p, float block_m) {
@@ -54,6 +54,8 @@ class SerialSearch : public SurfaceSearch::Tree {
                      std::vector<float>& squares) const override {
     flann::KNNSimpleResultSet<float> found(static_cast<std::size_t>(k));
     index_->findNeighbors(found, point.data, flann::SearchParams(-1, 0.0F));
+
+    // PCL's indices have another type
     std::vector<std::size_t> places(found.size());
     squares.resize(found.size());
     found.copy(places.data(), squares.data(), found.size(), true);
@@ -73,6 +75,8 @@ class SerialSearch : public SurfaceSearch::Tree {
 SurfaceCloud voxel_filtered(const SurfaceCloud& cloud, float voxel_m, bool independent) {
   constexpr float kBlock = 256.0F;  // voxels along each side: 2^24 cells
   std::map<Part, SurfaceCloud::Ptr> parts;
+
+  // In parts, since PCL numbers cells with 31 bits
   for (const SurfacePoint& p : cloud) {
     if (!p.getVector3fMap().allFinite() || !p.getNormalVector3fMap().allFinite()) continue;
     SurfaceCloud::Ptr& part = parts[part_of(p, kBlock * voxel_m)];
@@ -97,6 +101,7 @@ int nearest_facing(const SurfaceSearch::Tree& tree, const SurfacePoint& point, f
   for (const int looked_at : {1, 8}) {  // hardly ever is more than one needed
     const int found = tree.nearestKSearch(point, looked_at, indices, squares);
     for (int i = 0; i < found; ++i) {
+      // Neighbours are sorted: all others are farther away
       if (squares[static_cast<std::size_t>(i)] > distance_m * distance_m) return -1;
       const int index = indices[static_cast<std::size_t>(i)];
       const SurfacePoint& p = (*tree.getInputCloud())[static_cast<std::size_t>(index)];

@@ -18,7 +18,7 @@ SurfacePoint moved(const SurfacePoint& point, const Eigen::Matrix4f& target_from
 
 }  // namespace
 
-/// Some of the points, spread over the cloud, say how all have moved.
+/// The motion of all points, from some that are spread over the cloud.
 Eigen::Matrix4f TwoWayCorrespondences::source_from_moved() const {
   constexpr std::size_t kEnough = 64;
   const SurfaceCloud& source = *source_.cloud();
@@ -43,12 +43,14 @@ void TwoWayCorrespondences::determineCorrespondences(pcl::Correspondences& corre
     correspondences.emplace_back(query, match, squared);
   };
 
+  // From source to target
   for (const int i : of_source_) {
     const int match =
         nearest_facing(*target_search_.tree(), (*input_)[static_cast<std::size_t>(i)], reach, min_cosine_);
     if (match >= 0) add(i, match);
   }
 
+  // From target to source, in the source's frame
   const Eigen::Matrix4f back = source_from_moved();
   for (const int i : of_target_) {
     const SurfacePoint sample = moved((*target_search_.cloud())[static_cast<std::size_t>(i)], back);

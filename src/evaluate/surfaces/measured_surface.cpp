@@ -13,11 +13,15 @@ Foot MeshSurface::foot(const Eigen::Vector3d& q) const {
   return {std::sqrt(nearest.squared_distance), nearest.point, index_.normal(nearest.triangle)};
 }
 
+/// True if the neighbours do not leave half of the plane free.
 bool SampledSurface::surrounded(const Eigen::Vector3d& on_plane, const Eigen::Vector3d& normal) const {
+  // Neighbours of the foot
   constexpr double kPi = 3.14159265358979323846;
   constexpr std::size_t kNeighbors = 12;
   std::vector<Neighbor> found;
   index_.nearest(on_plane, kNeighbors, found);
+
+  // Directions to the neighbours, in the plane
   const Eigen::Vector3d u = normal.unitOrthogonal();
   const Eigen::Vector3d v = normal.cross(u);
   std::array<double, kNeighbors> angles{};
@@ -27,12 +31,15 @@ bool SampledSurface::surrounded(const Eigen::Vector3d& on_plane, const Eigen::Ve
     if (std::abs(normal.dot(d)) <= cell_m_) angles[count++] = std::atan2(v.dot(d), u.dot(d));
   }
   if (count < 2) return false;
+
+  // At a border the largest gap exceeds 180 degrees
   std::sort(angles.begin(), angles.begin() + static_cast<std::ptrdiff_t>(count));
   double gap = angles[0] + 2.0 * kPi - angles[count - 1];
   for (std::size_t i = 0; i + 1 < count; ++i) gap = std::max(gap, angles[i + 1] - angles[i]);
   return gap <= kPi + 1e-6;
 }
 
+/// The nearest point of the surface; beyond a border, the nearest sample.
 Foot SampledSurface::foot(const Eigen::Vector3d& q) const {
   const Neighbor nearest = index_.nearest(q);
   const Eigen::Vector3d p = index_.points()[nearest.index].cast<double>();
@@ -40,6 +47,7 @@ Foot SampledSurface::foot(const Eigen::Vector3d& q) const {
   const Foot at_sample{std::sqrt(nearest.squared_distance), p, normal};
   if (mode_ == SampleDistance::kPoint || normal.isZero()) return at_sample;
 
+  // The plane counts only where samples surround the foot
   const double height = normal.dot(q - p);
   const Eigen::Vector3d on_plane = q - height * normal;
   const double lateral_sq = (on_plane - p).squaredNorm();

@@ -30,6 +30,7 @@ void PointIndex::nearest(const Eigen::Vector3d& q, std::size_t k, std::vector<Ne
   for (std::size_t i = 0; i < found.size(); ++i) found[i] = {indices[i], distances[i]};
 }
 
+/// Normal of the best plane; zero if the neighbours are not flat or in a row.
 Eigen::Vector3f flat_normal(const std::vector<Eigen::Vector3f>& points, const std::vector<Neighbor>& found) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const Neighbor& n : found) mean += points[n.index].cast<double>();
@@ -39,6 +40,8 @@ Eigen::Vector3f flat_normal(const std::vector<Eigen::Vector3f>& points, const st
     const Eigen::Vector3d d = points[n.index].cast<double>() - mean;
     scatter += d * d.transpose();
   }
+
+  // Flat: the least spread is far below the second
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(scatter);
   const Eigen::Vector3d spread = solver.eigenvalues();
   if (!(spread(1) > 0.0) || spread(0) > 0.0625 * spread(1)) return Eigen::Vector3f::Zero();
@@ -53,15 +56,19 @@ Density density(const PointIndex& index, const core::Executor& executor) {
   constexpr double kPi = 3.14159265358979323846;
   if (index.size() < 2) return {};
 
+  // A subset along the index's order
   const std::size_t stride = (index.size() + kMost - 1) / kMost;
   const std::size_t count = (index.size() + stride - 1) / stride;
   std::vector<double> nearest(count, 0.0);
   std::vector<double> sixteenth(count, 0.0);
 
+  // Nearest distance and the distance to the sixteenth
   for_chunks(executor, count, kChunk, [&](std::size_t first, std::size_t last) {
     std::vector<Neighbor> found;
     for (std::size_t i = first; i < last; ++i) {
       index.nearest(index.points()[index.order()[i * stride]].cast<double>(), kNeighbors + 1, found);
+
+      // Doubled points do not count as neighbours
       const auto other = std::find_if(found.begin(), found.end(),
                                       [](const Neighbor& n) { return n.squared_distance > 0.0; });
       if (other != found.end()) nearest[i] = std::sqrt(other->squared_distance);
@@ -69,6 +76,7 @@ Density density(const PointIndex& index, const core::Executor& executor) {
     }
   });
 
+  // Medians resist holes and doubled points
   const auto median_of_positive = [](std::vector<double>& values) {
     values.erase(std::remove(values.begin(), values.end(), 0.0), values.end());
     return summarize(values).median;
@@ -78,6 +86,7 @@ Density density(const PointIndex& index, const core::Executor& executor) {
           squared > 0.0 ? static_cast<double>(kNeighbors) / (kPi * squared) : 0.0};
 }
 
+/// Normals from twelve neighbours, zero where these are not flat.
 std::vector<Eigen::Vector3f> estimate_normals(const PointIndex& index, const core::Executor& executor) {
   std::vector<Eigen::Vector3f> normals(index.size(), Eigen::Vector3f::Zero());
   for_chunks(executor, index.size(), kChunk, [&](std::size_t first, std::size_t last) {

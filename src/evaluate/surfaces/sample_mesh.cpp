@@ -13,8 +13,9 @@ SurfaceSamples sample_mesh(const TriangleMesh& mesh, double spacing_m) {
   SurfaceSamples samples;
   double due = 0.5;  // samples owed by the area passed so far, so that small triangles get their share
   double u = 0.5;
-
   double v = 0.5;
+
+  // Each triangle adds its area to the samples due
   for (const auto& triangle : mesh.triangles) {
     const Eigen::Vector3d a = mesh.vertices[triangle[0]].cast<double>();
     const Eigen::Vector3d ab = mesh.vertices[triangle[1]].cast<double>() - a;
@@ -22,6 +23,7 @@ SurfaceSamples sample_mesh(const TriangleMesh& mesh, double spacing_m) {
     const Eigen::Vector3d cross = ab.cross(ac);
     due += 0.5 * cross.norm() / (spacing_m * spacing_m);
 
+    // Samples due in this triangle
     for (; due >= 1.0; due -= 1.0) {
       u = u + kStepU - std::floor(u + kStepU);
       v = v + kStepV - std::floor(v + kStepV);
@@ -32,11 +34,11 @@ SurfaceSamples sample_mesh(const TriangleMesh& mesh, double spacing_m) {
       samples.normals.emplace_back(cross.normalized().cast<float>());
       if (mesh.visible.empty()) continue;
 
+      // The nearest corner decides the visibility
       const std::size_t corner = 1.0 - s - t >= std::max(s, t) ? 0 : (s >= t ? 1 : 2);
       samples.visible.push_back(mesh.visible[triangle[corner]]);
     }
   }
-
   return samples;
 }
 

@@ -28,6 +28,7 @@ Points vectors(const cloud::PlyData& ply, const char* x, const char* y, const ch
   return out;
 }
 
+/// The property visible, stored as a byte or as a float.
 std::vector<std::uint8_t> visibility(const cloud::PlyData& ply) {
   if (const auto* bytes = ply.bytes("visible")) return *bytes;
   std::vector<std::uint8_t> out;
@@ -49,6 +50,7 @@ void tidy_normals(Points& normals) {
   if (!any) normals.clear();
 }
 
+/// A reference must have finite points.
 core::Result<void> check_reference(const std::filesystem::path& file, const Points& points) {
   if (points.empty()) return core::input_error(fmt::format("{}: the reference has no points", file.string()));
   const auto bad = std::count_if(points.begin(), points.end(), [](const auto& p) { return !p.allFinite(); });
@@ -64,9 +66,11 @@ core::Result<void> check_reference(const std::filesystem::path& file, const Poin
 }  // namespace
 
 core::Result<Reference> load_reference(const std::filesystem::path& file) {
+  // The name serves messages
   Reference reference;
   reference.name = file.string();
 
+  // Other formats hold points only
   if (core::ending_of(file) != ".ply") {
     auto samples = load_cloud(file);
     if (!samples) return tl::unexpected(samples.error());
@@ -77,16 +81,19 @@ core::Result<Reference> load_reference(const std::filesystem::path& file) {
     return reference;
   }
 
+  // A PLY file may hold a mesh
   const auto ply = cloud::read_ply(file, true);
   if (!ply) return tl::unexpected(ply.error());
   if (ply->vertex_count == 0)
     return core::input_error(fmt::format("{}: the reference has no points", file.string()));
 
+  // Every reference needs positions
   Points points = vectors(*ply, "x", "y", "z");
   if (points.empty())
     return core::input_error(fmt::format("{}: has no properties x, y and z", file.string()));
   if (const auto ok = check_reference(file, points); !ok) return tl::unexpected(ok.error());
 
+  // Faces make it a mesh
   reference.shift = Eigen::Map<const Eigen::Vector3d>(ply->shift.data());
   reference.frame = cloud::frame_in(ply->comments);
   if (!ply->triangles.empty()) {
@@ -94,12 +101,14 @@ core::Result<Reference> load_reference(const std::filesystem::path& file) {
     return reference;
   }
 
+  // Without faces it is a cloud
   reference.samples = {std::move(points), vectors(*ply, "nx", "ny", "nz"), visibility(*ply), reference.shift,
                        reference.frame};
   tidy_normals(reference.samples.normals);
   return reference;
 }
 
+/// A cloud with its shift and frame; normals that are not finite become zero.
 core::Result<SurfaceSamples> load_cloud(const std::filesystem::path& file) {
   const auto read = cloud::read_cloud(file, cloud::LargeCoordinates::kShifted);
   if (!read) return tl::unexpected(read.error());
@@ -111,6 +120,7 @@ core::Result<SurfaceSamples> load_cloud(const std::filesystem::path& file) {
   return samples;
 }
 
+/// Points and normals of a cloud.
 SurfaceSamples samples_of(const cloud::Cloud& cloud) {
   SurfaceSamples samples;
   samples.points.reserve(cloud.size());

@@ -41,6 +41,7 @@ Eigen::Vector3d nearest_on_triangle(const Eigen::Vector3d& q, const Eigen::Vecto
   return best;
 }
 
+/// Vertices and triangles are copied to the buffers of Embree.
 TriangleIndex::TriangleIndex(const TriangleMesh& mesh)
     : mesh_(mesh), device_(core::made(rtcNewDevice("set_affinity=0"))), scene_(rtcNewScene(device_)) {
   RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
@@ -71,6 +72,7 @@ MeshPoint TriangleIndex::on(std::uint32_t triangle, const Eigen::Vector3d& q) co
 
 /// Embree finds the boxes in reach, in float; distances are taken in double.
 MeshPoint TriangleIndex::nearest(const Eigen::Vector3d& q) const {
+  // The best triangle so far
   struct Search {
     const TriangleIndex& index;
     const Eigen::Vector3d& q;
@@ -79,17 +81,21 @@ MeshPoint TriangleIndex::nearest(const Eigen::Vector3d& q) const {
   } search{*this, q, 1e-6 * (1.0 + q.cwiseAbs().maxCoeff()), {}};
   search.best.squared_distance = std::numeric_limits<double>::infinity();
 
+  // Each hit shrinks the radius of the search
   const auto visit = [](RTCPointQueryFunctionArguments* found) {
     auto& s = *static_cast<Search*>(found->userPtr);
     const MeshPoint p = s.index.on(found->primID, s.q);
     const bool tie = p.squared_distance == s.best.squared_distance;  // on an edge: the first triangle's
     if (!(p.squared_distance < s.best.squared_distance || (tie && p.triangle < s.best.triangle)))
       return false;
+
+    // From here on only nearer boxes matter
     s.best = p;
     found->query->radius = static_cast<float>(std::sqrt(p.squared_distance) + s.slack);
     return true;
   };
 
+  // The first radius is unlimited
   RTCPointQuery query{static_cast<float>(q.x()), static_cast<float>(q.y()), static_cast<float>(q.z()), 0.0F,
                       std::numeric_limits<float>::infinity()};
   RTCPointQueryContext context;
@@ -98,6 +104,7 @@ MeshPoint TriangleIndex::nearest(const Eigen::Vector3d& q) const {
   return search.best;
 }
 
+/// Unit normal, or zero for a triangle without area.
 Eigen::Vector3d TriangleIndex::normal(std::uint32_t triangle) const {
   const auto& [a, b, c] = mesh_.triangles[triangle];
   const Eigen::Vector3d p = mesh_.vertices[a].cast<double>();

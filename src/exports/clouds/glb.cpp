@@ -47,6 +47,7 @@ std::array<T, 3> y_up(T x, T y, T z) {
   return {x, z, -y};
 }
 
+/// Points with colours as linear light.
 core::Result<GlbData> points_as_glb(MapSource& source) {
   const auto cloud = source.cloud();
   if (!cloud) return tl::unexpected(cloud.error());
@@ -60,16 +61,19 @@ core::Result<GlbData> points_as_glb(MapSource& source) {
   return data;
 }
 
+/// The mesh with unit normals, which glTF requires.
 core::Result<GlbData> mesh_as_glb(MapSource& source) {
   const auto mesh = mesh_of(source);
   if (!mesh) return tl::unexpected(mesh.error());
 
+  // Columns of the mesh
   const std::array<std::uint16_t, 256> light = linear_light();
   std::array<const std::vector<float>*, 6> columns{};
   const std::array<const char*, 6> names{"x", "y", "z", "nx", "ny", "nz"};
   for (std::size_t k = 0; k < 6; ++k) columns[k] = mesh->floats(names[k]);
   const auto *red = mesh->bytes("red"), *green = mesh->bytes("green"), *blue = mesh->bytes("blue");
 
+  // Vertices in glTF's axes
   GlbData data;
   for (std::size_t v = 0; v < mesh->vertex_count; ++v) {
     const auto at = [&](std::size_t k) { return (*columns[k])[v]; };
@@ -80,6 +84,7 @@ core::Result<GlbData> mesh_as_glb(MapSource& source) {
     data.colors.push_back({light[(*red)[v]], light[(*green)[v]], light[(*blue)[v]], 65535});
   }
 
+  // Positions are floats, so the shift stays apart
   data.triangles = mesh->triangles;
   data.shift = y_up(mesh->shift[0], mesh->shift[1], mesh->shift[2]);
   return data;
@@ -90,70 +95,95 @@ std::size_t byte_size(const std::vector<T>& values) {
   return values.size() * sizeof(T);
 }
 
-/// The JSON part: the buffer's sections one after another, and the accessors that read them.
-Json glb_json(const GlbData& data, const std::string& name, const std::string& frame) {
-  constexpr int kFloat = 5126, kShort = 5123, kInt = 5125, kVertices = 34962, kIndices = 34963;
+/// glTF's numbers for types of components and targets of sections.
+constexpr int kFloat = 5126, kShort = 5123, kInt = 5125, kVertices = 34962, kIndices = 34963;
+
+/// The accessor of positions, of which glTF requires the range.
+Json position_accessor(const std::vector<std::array<float, 3>>& positions) {
   std::array<float, 3> low{}, high{};
   low.fill(std::numeric_limits<float>::max());
   high.fill(std::numeric_limits<float>::lowest());
-
-  for (const auto& p : data.positions) {
+  for (const auto& p : positions) {
     for (std::size_t k = 0; k < 3; ++k) {
       low[k] = std::min(low[k], p[k]);
       high[k] = std::max(high[k], p[k]);
     }
   }
+  return {
+      {"componentType", kFloat}, {"count", positions.size()}, {"type", "VEC3"}, {"min", low}, {"max", high}};
+}
 
+/// Sections of the buffer one after another, each with the accessor that reads it.
+class GlbSections {
+ public:
+  explicit GlbSections(Json& json) : json_(json) {
+    json_["bufferViews"] = Json::array();
+    json_["accessors"] = Json::array();
+  }
+  /// Returns the number of the accessor.
+  std::size_t add(std::size_t bytes, int target, Json accessor) {
+    accessor["bufferView"] = json_["bufferViews"].size();
+    json_["bufferViews"].push_back(
+        {{"buffer", 0}, {"byteOffset", bytes_}, {"byteLength", bytes}, {"target", target}});
+    json_["accessors"].push_back(std::move(accessor));
+    bytes_ += bytes;
+    return json_["accessors"].size() - 1;
+  }
+  [[nodiscard]] std::size_t bytes() const { return bytes_; }
+
+ private:
+  Json& json_;
+  std::size_t bytes_ = 0;
+};
+
+/// The points or the mesh, with its sections in the order in which they are written.
+Json glb_primitive(const GlbData& data, GlbSections& sections) {
+  const std::size_t count = data.positions.size();
+  Json attributes;
+  attributes["POSITION"] =
+      sections.add(byte_size(data.positions), kVertices, position_accessor(data.positions));
+  if (!data.normals.empty()) {
+    attributes["NORMAL"] = sections.add(byte_size(data.normals), kVertices,
+                                        {{"componentType", kFloat}, {"count", count}, {"type", "VEC3"}});
+  }
+
+  attributes["COLOR_0"] =
+      sections.add(byte_size(data.colors), kVertices,
+                   {{"componentType", kShort}, {"normalized", true}, {"count", count}, {"type", "VEC4"}});
+
+  // Mode 0 is points, mode 4 triangles
+  Json primitive = {{"attributes", attributes}, {"material", 0}, {"mode", data.triangles.empty() ? 0 : 4}};
+  if (!data.triangles.empty()) {
+    primitive["indices"] =
+        sections.add(byte_size(data.triangles), kIndices,
+                     {{"componentType", kInt}, {"count", 3 * data.triangles.size()}, {"type", "SCALAR"}});
+  }
+  return primitive;
+}
+
+/// The JSON part.
+Json glb_json(const GlbData& data, const std::string& name, const std::string& frame) {
   Json json;
   json["asset"] = {{"version", "2.0"},
                    {"generator", std::string("plumbline ") + core::version()},
                    {"extras", {{"frame", frame + "; turned to glTF's axes: y up, metres"}}}};
+
+  // One node, moved by the shift
   json["scene"] = 0;
   json["scenes"] = Json::array({{{"nodes", {0}}}});
   json["nodes"] = Json::array({{{"name", name}, {"mesh", 0}}});
   if (data.shift != std::array<double, 3>{}) json["nodes"][0]["translation"] = data.shift;
+  GlbSections sections(json);
+  const Json primitive = glb_primitive(data, sections);
 
-  std::size_t offset = 0;
-  const auto add = [&](std::size_t bytes, int target, Json accessor) {
-    accessor["bufferView"] = json["bufferViews"].size();
-    json["bufferViews"].push_back(
-        {{"buffer", 0}, {"byteOffset", offset}, {"byteLength", bytes}, {"target", target}});
-    json["accessors"].push_back(std::move(accessor));
-    offset += bytes;
-    return json["accessors"].size() - 1;
-  };
-
-  json["bufferViews"] = Json::array();
-  json["accessors"] = Json::array();
-  const std::size_t count = data.positions.size();
-  Json attributes;
-  attributes["POSITION"] =
-      add(byte_size(data.positions), kVertices,
-          {{"componentType", kFloat}, {"count", count}, {"type", "VEC3"}, {"min", low}, {"max", high}});
-
-  if (!data.normals.empty()) {
-    attributes["NORMAL"] = add(byte_size(data.normals), kVertices,
-                               {{"componentType", kFloat}, {"count", count}, {"type", "VEC3"}});
-  }
-
-  attributes["COLOR_0"] =
-      add(byte_size(data.colors), kVertices,
-          {{"componentType", kShort}, {"normalized", true}, {"count", count}, {"type", "VEC4"}});
-
-  Json primitive = {{"attributes", attributes}, {"material", 0}, {"mode", data.triangles.empty() ? 0 : 4}};
-  if (!data.triangles.empty()) {
-    primitive["indices"] =
-        add(byte_size(data.triangles), kIndices,
-            {{"componentType", kInt}, {"count", 3 * data.triangles.size()}, {"type", "SCALAR"}});
-  }
-
+  // Colours as recorded, without lighting
   json["meshes"] = Json::array({{{"primitives", Json::array({primitive})}}});
   json["materials"] =
       Json::array({{{"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", 1.0}}},
                     {"doubleSided", true},
                     {"extensions", {{"KHR_materials_unlit", Json::object()}}}}});
   json["extensionsUsed"] = {"KHR_materials_unlit"};
-  json["buffers"] = Json::array({{{"byteLength", offset}}});
+  json["buffers"] = Json::array({{{"byteLength", sections.bytes()}}});
   return json;
 }
 

@@ -47,6 +47,7 @@ const std::vector<float>* column_named(const cloud::CloudColumns& columns, const
   return nullptr;
 }
 
+/// Columns that become extra bytes of each point.
 std::vector<LasExtra> extras_of(const cloud::CloudColumns& columns) {
   std::vector<LasExtra> extras;
   if (!columns.robot.empty()) extras.push_back({"robot", "number of the robot that saw it", 1});
@@ -56,6 +57,7 @@ std::vector<LasExtra> extras_of(const cloud::CloudColumns& columns) {
   return extras;
 }
 
+/// The header of a variable length record.
 void put_vlr_header(core::OutputFile& out, const std::string& user, std::uint16_t record, std::size_t size,
                     const std::string& description) {
   out.put(std::uint16_t{0});
@@ -65,6 +67,7 @@ void put_vlr_header(core::OutputFile& out, const std::string& user, std::uint16_
   put_fixed<32>(out, description);
 }
 
+/// Descriptions of the extra bytes, record 4 of the specification.
 void put_extra_records(core::OutputFile& out, const std::vector<LasExtra>& extras) {
   put_vlr_header(out, "LASF_Spec", 4, extras.size() * kExtraRecordSize, "extra bytes");
   for (const LasExtra& extra : extras) {
@@ -77,9 +80,10 @@ void put_extra_records(core::OutputFile& out, const std::vector<LasExtra>& extra
   }
 }
 
-/// Coordinates as integers: of the offset, in steps of the scale.
+/// Coordinates as integers: steps of the scale from the offset.
 struct LasSteps {
   Eigen::Vector3d offset;
+  /// Rounded to the nearest step.
   [[nodiscard]] std::array<std::int32_t, 3> of(const Eigen::Vector3d& place) const {
     std::array<std::int32_t, 3> steps{};
     for (int k = 0; k < 3; ++k) {
@@ -101,6 +105,7 @@ struct LasLayout {
   std::uint16_t point_size = kFormat7Size;
 };
 
+/// Sizes of the variable length records and of a point.
 LasLayout layout_of_las(const cloud::CloudColumns& columns, const std::optional<Georeference>& reference) {
   LasLayout layout;
   layout.extras = extras_of(columns);
@@ -118,6 +123,7 @@ LasLayout layout_of_las(const cloud::CloudColumns& columns, const std::optional<
   return layout;
 }
 
+/// The header of LAS 1.4; legacy counts are zero, as format 7 requires.
 void put_las_header(core::OutputFile& out, const LasLayout& layout, const LasSteps& steps,
                     const Eigen::AlignedBox3d& box, std::uint64_t points) {
   out.write("LASF");
@@ -128,6 +134,7 @@ void put_las_header(core::OutputFile& out, const LasLayout& layout, const LasSte
   out.put(std::uint8_t{4});
   put_fixed<32>(out, "RGB-D SLAM");
 
+  // Program, sizes and point format
   put_fixed<32>(out, std::string("plumbline ") + core::version());
   out.put(std::uint16_t{0});  // day and year: same map, same bytes
   out.put(std::uint16_t{0});
@@ -137,10 +144,12 @@ void put_las_header(core::OutputFile& out, const LasLayout& layout, const LasSte
   out.put(std::uint8_t{7});
   out.put(layout.point_size);
 
+  // Steps and offset of coordinates
   for (int i = 0; i < 6; ++i) out.put(std::uint32_t{0});  // legacy counts
   out.put(std::array<double, 3>{kLasScale_m, kLasScale_m, kLasScale_m});
   out.put(std::array<double, 3>{steps.offset.x(), steps.offset.y(), steps.offset.z()});
 
+  // Extent and number of points
   for (int k = 0; k < 3; ++k) out.put(std::array<double, 2>{box.max()[k], box.min()[k]});
   out.put(std::uint64_t{0});  // waveforms
   out.put(std::uint64_t{0});  // extended records
@@ -150,6 +159,7 @@ void put_las_header(core::OutputFile& out, const LasLayout& layout, const LasSte
   for (int i = 0; i < 14; ++i) out.put(std::uint64_t{0});
 }
 
+/// A point of format 7: position and colour, everything else unset.
 void put_las_point(core::OutputFile& out, const std::array<std::int32_t, 3>& steps, const cloud::Point& p) {
   const auto wide = [](std::uint8_t value) { return static_cast<std::uint16_t>(value * 257U); };
   out.put(steps);
@@ -164,6 +174,7 @@ void put_las_point(core::OutputFile& out, const std::array<std::int32_t, 3>& ste
   out.put(std::array<std::uint16_t, 3>{wide(p.r), wide(p.g), wide(p.b)});
 }
 
+/// All points, each with its extra bytes.
 void put_las_points(core::OutputFile& out, const cloud::CloudFile& file, const LasSteps& steps) {
   const cloud::CloudColumns& columns = file.columns;
   const std::vector<float>* sigma = column_named(columns, cloud::kSigmaColumn);

@@ -9,6 +9,7 @@
 namespace plumbline::exports {
 namespace {
 
+/// Writes the mesh as PLY or OBJ.
 core::Result<ExportSummary> write_mesh_file(MapSource& source, const std::filesystem::path& output) {
   auto mesh = mesh_of(source);
   if (!mesh) return tl::unexpected(mesh.error());
@@ -24,6 +25,7 @@ core::Result<ExportSummary> write_mesh_file(MapSource& source, const std::filesy
 
 }  // namespace
 
+/// The mesh of the selected points by Poisson reconstruction, which needs normals.
 core::Result<cloud::PlyData> mesh_of(MapSource& source) {
   const auto cloud = source.cloud();
   if (!cloud) return tl::unexpected(cloud.error());
@@ -33,12 +35,14 @@ core::Result<cloud::PlyData> mesh_of(MapSource& source) {
         source.request().input.string()));
   }
 
+  // The user's resolution, or the default
   constexpr double kDefault_m = 0.02;
   const ExportOptions& options = source.options();
   cloud::MeshOptions mesh_options;
   mesh_options.resolution_m = options.resolution_m > 0.0 ? options.resolution_m : kDefault_m;
   mesh_options.reach_m = options.reach_m;
 
+  // The library of the reconstruction prints to the terminal
   core::Result<cloud::PlyData> mesh;
   const auto work = [&] { mesh = cloud::make_mesh(*(*cloud)->cloud, mesh_options); };
   if (source.request().quietly) {
@@ -47,6 +51,7 @@ core::Result<cloud::PlyData> mesh_of(MapSource& source) {
     work();
   }
 
+  // Vertices are less the cloud's shift
   if (mesh) mesh->shift = {(*cloud)->shift.x(), (*cloud)->shift.y(), (*cloud)->shift.z()};
   return mesh;
 }

@@ -18,12 +18,16 @@ core::Result<void> write_ascii_pcd(const std::filesystem::path& output, const cl
   const std::size_t points = file.cloud->size();
   out.write("# .PCD v0.7 - Point Cloud Data file format\n");
   for (const std::string& comment : comments) out.write("# " + comment + "\n");
+
+  // Large coordinates need doubles
   out.write(
       fmt::format("VERSION 0.7\n"
                   "FIELDS x y z rgb normal_x normal_y normal_z\nSIZE {}\nTYPE F F F U F F F\n"
                   "COUNT 1 1 1 1 1 1 1\nWIDTH {}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {}\n"
                   "DATA ascii\n",
                   file.shift.isZero(0.0) ? "4 4 4 4 4 4 4" : "8 8 8 4 4 4 4", points, points));
+
+  // The three channels make one number
   for (const cloud::Point& p : *file.cloud) {
     const unsigned color = (unsigned{p.r} << 16U) | (unsigned{p.g} << 8U) | unsigned{p.b};
     const Eigen::Vector3d at = p.getVector3fMap().cast<double>() + file.shift;
@@ -33,6 +37,7 @@ core::Result<void> write_ascii_pcd(const std::filesystem::path& output, const cl
   return out.commit();
 }
 
+/// Writes PCD, binary unless text is wanted.
 core::Result<ExportSummary> write_pcd_cloud(MapSource& source, const std::filesystem::path& output) {
   const auto cloud = source.cloud();
   if (!cloud) return tl::unexpected(cloud.error());

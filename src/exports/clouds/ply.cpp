@@ -11,12 +11,14 @@
 namespace plumbline::exports {
 namespace {
 
+/// Writes PLY as text, with the columns of text_columns().
 core::Result<void> write_ascii_ply(const std::filesystem::path& output, const cloud::CloudFile& file,
                                    const std::vector<std::string>& comments) {
   core::OutputFile out(output);
   out.write("ply\nformat ascii 1.0\ncomment plumbline, metres\n");
   for (const std::string& comment : comments) out.write("comment " + comment + "\n");
 
+  // Large coordinates need doubles
   out.write(fmt::format("element vertex {}\n", file.cloud->size()));
   for (const std::string& name : text_columns(file)) {
     const bool byte = name == "red" || name == "green" || name == "blue" || name == "robot";
@@ -30,6 +32,7 @@ core::Result<void> write_ascii_ply(const std::filesystem::path& output, const cl
   return out.commit();
 }
 
+/// Writes PLY, in world coordinates if the options give them.
 core::Result<ExportSummary> write_ply_cloud(MapSource& source, const std::filesystem::path& output) {
   const auto reference = georeference_of(source.options(), source.log());
   if (!reference) return tl::unexpected(reference.error());
@@ -40,6 +43,7 @@ core::Result<ExportSummary> write_ply_cloud(MapSource& source, const std::filesy
   summary.written = {output};
   std::vector<std::string> comments;
 
+  // The header names the frame
   if (*reference) {
     comments = {fmt::format("frame: {} (EPSG:{}); x east, y north, z up, metres", (*reference)->name,
                             (*reference)->epsg)};
@@ -48,6 +52,7 @@ core::Result<ExportSummary> write_ply_cloud(MapSource& source, const std::filesy
     comments = source.frame().comments();
   }
 
+  // Points in that frame
   const cloud::CloudFile file = *reference ? to_world(**cloud, **reference) : **cloud;
   auto written = source.options().ascii
                      ? write_ascii_ply(output, file, comments)

@@ -12,6 +12,7 @@
 namespace plumbline::exports {
 namespace {
 
+/// Rows of numbers; CSV begins with the names of its columns.
 core::Result<ExportSummary> write_text_cloud(MapSource& source, const std::filesystem::path& output,
                                              bool csv) {
   const auto cloud = source.cloud();

@@ -45,6 +45,7 @@ class CrossedColumns {
     part_m_ = std::max(kThinnest_m, (heights.high_m - heights.low_m) / kMostParts);
   }
 
+  /// Adds the rays of a view, each up to a little before its end.
   void add(const ViewRays& rays) {
     const double margin_m = 1.5 * grid_.resolution_m;  // before the hit, for noise and the cell itself
     for (const Eigen::Vector3f& end : rays.ends) {
@@ -135,6 +136,7 @@ core::Result<Grid> grid_over(const cloud::CloudFile& file, const std::vector<Exp
   Grid grid;
   grid.resolution_m = resolution_m;
 
+  // Whole multiples of the cell size, with a margin
   const Eigen::Array2d low = (box.min().array() / resolution_m).floor() - 2.0;
   const Eigen::Array2d high = (box.max().array() / resolution_m).floor() + 3.0;
   if ((high - low).prod() > kMostCells) {
@@ -143,6 +145,7 @@ core::Result<Grid> grid_over(const cloud::CloudFile& file, const std::vector<Exp
         (high - low).prod() / 1e6, resolution_m));
   }
 
+  // Unknown until points or rays show more
   grid.origin = low * resolution_m;
   grid.columns = static_cast<int>(high.x() - low.x());
   grid.rows = static_cast<int>(high.y() - low.y());
@@ -157,6 +160,7 @@ struct MeasuredCells {
   std::vector<bool> floor;
 };
 
+/// Cells that contain points at the height of obstacles, or of the floor.
 MeasuredCells measured_cells(const Grid& grid, const cloud::CloudFile& file, const GridHeights& heights) {
   MeasuredCells cells{std::vector<bool>(grid.cells.size(), false),
                       std::vector<bool>(grid.cells.size(), false)};
@@ -186,10 +190,12 @@ void free_where_carried(const std::vector<ExportPose>& path, const GridHeights& 
   const int reach = static_cast<int>(std::ceil(kBody_m / grid.resolution_m));
   std::vector<std::pair<std::size_t, double>> around;  // cells and their distance
 
+  // Cameras that a body can have carried
   for (const ExportPose& pose : path) {
     const Eigen::Vector3d& camera = pose.world_from_camera.translation;
     if (camera.z() < heights.floor_m || camera.z() > heights.floor_m + kHighestHand_m) continue;
 
+    // Cells below the body
     around.clear();
     const Eigen::Vector2i middle = column_and_row(grid, camera.head<2>());
     for (int y = -reach; y <= reach; ++y) {
@@ -200,6 +206,7 @@ void free_where_carried(const std::vector<ExportPose>& path, const GridHeights& 
       }
     }
 
+    // Free up to the nearest obstacle
     double room_m = std::numeric_limits<double>::infinity();  // to the nearest obstacle
     for (const auto& [cell, distance_m] : around) {
       if (grid.cells[cell] == GridCell::kOccupied) room_m = std::min(room_m, distance_m);
@@ -212,11 +219,14 @@ void free_where_carried(const std::vector<ExportPose>& path, const GridHeights& 
 
 }  // namespace
 
+/// Decides on cells: obstacles from points, free space from rays and the cameras' path.
 core::Result<void> set_cells(const cloud::CloudFile& cloud, const std::vector<ExportPose>& path,
                              const ForEachView& views, const GridHeights& heights, Grid& grid) {
   constexpr double kTableTop_m = 1.0;  // highest plate over floor that was seen
   MeasuredCells measured = measured_cells(grid, cloud, heights);
   CrossedColumns crossed(grid, heights);
+
+  // Rays cross free space and end on the floor
   auto seen = views([&](const ViewRays& view) -> core::Result<void> {
     crossed.add(view);
     add_floor(grid, view, heights, measured.floor);
@@ -224,6 +234,7 @@ core::Result<void> set_cells(const cloud::CloudFile& cloud, const std::vector<Ex
   });
   if (!seen) return seen;
 
+  // Over a visible floor, columns must be empty only up to the height of tables
   const double top_m = std::min(heights.high_m, heights.floor_m + kTableTop_m);
   for (std::size_t i = 0; i < grid.cells.size(); ++i) {
     if (measured.obstacle[i]) {
@@ -233,16 +244,19 @@ core::Result<void> set_cells(const cloud::CloudFile& cloud, const std::vector<Ex
     }
   }
 
+  // A body has stood there
   free_where_carried(path, heights, grid);
   return {};
 }
 
+/// The grid of the selected part of the map.
 core::Result<Grid> make_grid(MapSource& source) {
   if (auto up = source.need_upright("a grid"); !up) return tl::unexpected(up.error());
   const ExportOptions& options = source.options();
   if (options.heights[0] >= options.heights[1])
     return core::usage_error("--heights: takes two heights over the floor, the lower first");
 
+  // Points, and the path if there is one
   const auto cloud = source.cloud();
   if (!cloud) return tl::unexpected(cloud.error());
 
@@ -251,6 +265,7 @@ core::Result<Grid> make_grid(MapSource& source) {
   auto grid = grid_over(**cloud, path, options.resolution_m > 0.0 ? options.resolution_m : kGridDefault_m);
   if (!grid) return grid;
 
+  // Heights are given over the floor
   const double floor_m = source.floor_m();
   const auto set = set_cells(
       **cloud, path, [&](const auto& take) { return for_each_view(source, take); },

@@ -15,6 +15,7 @@ constexpr std::uint8_t kNav2Free = 254;
 constexpr std::uint8_t kNav2Occupied = 0;
 constexpr std::uint8_t kNav2Unknown = 205;  // (255 - 205) / 255 = 0.19608: just above free_thresh
 
+/// The grid as an image, whose first row is the northernmost.
 core::Result<void> write_pgm(const std::filesystem::path& file, const Grid& grid, const std::string& frame) {
   core::OutputFile out(file);
   out.write(
@@ -30,6 +31,7 @@ core::Result<void> write_pgm(const std::filesystem::path& file, const Grid& grid
   return out.commit();
 }
 
+/// Writes the grid's image, and the YAML file that names it.
 core::Result<ExportSummary> write_nav2(MapSource& source, const std::filesystem::path& output) {
   std::filesystem::path image = output;
   std::filesystem::path yaml = output;
@@ -42,6 +44,7 @@ core::Result<ExportSummary> write_nav2(MapSource& source, const std::filesystem:
   if (auto written = write_pgm(image, *grid, source.frame_text()); !written)
     return tl::unexpected(written.error());
 
+  // These thresholds keep unknown cells unknown
   const auto written = core::write_file(
       yaml, fmt::format("# {}\n# occupied: between {:g} and {:g} m over the floor\nimage: {}\nmode: trinary\n"
                         "resolution: {:g}\norigin: [{:.6f}, {:.6f}, 0]\nnegate: 0\noccupied_thresh: 0.65\n"

@@ -10,6 +10,7 @@
 namespace plumbline::exports {
 namespace {
 
+/// Writes an octree; the part "octomap" makes it.
 core::Result<ExportSummary> write_octomap(MapSource& source, const std::filesystem::path& output) {
   constexpr double kDefault_m = 0.05;
   const auto cloud = source.cloud();
@@ -18,6 +19,7 @@ core::Result<ExportSummary> write_octomap(MapSource& source, const std::filesyst
   const auto& octomap = core::part<OctreeFunctions>();
   if (!octomap) return tl::unexpected(octomap.error());
 
+  // The ending decides between colours and the binary tree
   OctreeWork work;
   work.resolution_m = source.options().resolution_m > 0.0 ? source.options().resolution_m : kDefault_m;
   work.color = core::ending_of(output) == ".ot";
@@ -26,6 +28,7 @@ core::Result<ExportSummary> write_octomap(MapSource& source, const std::filesyst
   work.box = source.selected();
   work.views = [&](const auto& take) { return for_each_view(source, take); };
 
+  // The file appears only when it is whole
   const auto bytes = (*octomap)->make(work);
   if (!bytes) return tl::unexpected(bytes.error());
   if (auto written = core::write_file(output, *bytes); !written) return tl::unexpected(written.error());

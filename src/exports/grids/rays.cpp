@@ -36,6 +36,7 @@ ViewRays rays_of(const cloud::Cloud& view, const geometry::Rigid3& world_from_ca
 
 }  // namespace
 
+/// Calls `take` with the rays of each view, in the order of the views.
 core::Result<void> for_each_view(const MapSource& source,
                                  const std::function<core::Result<void>(const ViewRays&)>& take) {
   const auto store = source.store("free space");
@@ -49,12 +50,14 @@ core::Result<void> for_each_view(const MapSource& source,
                     source.request().input.string()));
   }
 
+  // Blocks bound the memory of decoded views
   constexpr std::size_t kAtOnce = 16;
   for (std::size_t first = 0; first < views->size(); first += kAtOnce) {
     const std::size_t count = std::min(kAtOnce, views->size() - first);
     std::vector<ViewRays> rays(count);
     std::vector<std::optional<core::Error>> wrong(count);
 
+    // Decoding is the slow part and runs in parallel
     source.executor().parallel_for(count, [&](std::size_t k) {
       const auto cloud = views->read(first + k);
       if (!cloud) {
@@ -64,6 +67,7 @@ core::Result<void> for_each_view(const MapSource& source,
       rays[k] = rays_of(**cloud, source.world_from_map() * views->world_from_camera[first + k]);
     });
 
+    // Views are taken in order, so that results do not depend on threads
     for (std::size_t k = 0; k < count; ++k) {
       if (wrong[k]) return tl::unexpected(*wrong[k]);
       if (auto taken = take(rays[k]); !taken) return taken;

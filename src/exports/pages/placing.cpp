@@ -58,6 +58,7 @@ double radius_of(const PosePairs& pairs) {
   return std::sqrt(std::max(0.0, squares / count - (sum / count).squaredNorm()));
 }
 
+/// Points and normals as evaluate takes them; unknown normals are zero.
 evaluate::SurfaceSamples samples_of(const viewer::Points& points) {
   evaluate::SurfaceSamples samples;
   samples.shift = {points.shift[0], points.shift[1], points.shift[2]};
@@ -88,6 +89,8 @@ core::Result<mapping::MergeEvidence> shared_places(const MapSource& one, const M
   const maps::StoredMap& first = (*one.store("places"))->stored();
   const maps::StoredMap& second = (*other.store("places"))->stored();
   std::vector<mapping::MapPart> parts(2);
+
+  // Robots of both maps need different numbers
   parts[0].map = &first.map;
   std::int32_t free = 0;
   for (const maps::RobotInfo& robot : first.header.robots) {
@@ -95,6 +98,7 @@ core::Result<mapping::MergeEvidence> shared_places(const MapSource& one, const M
     free = std::max(free, robot.number + 1);
   }
 
+  // Robots of the second map follow those of the first
   std::map<std::int32_t, std::int32_t> numbers;
   for (const maps::RobotInfo& robot : second.header.robots) {
     parts[1].cameras[free] = robot.camera.color;
@@ -103,6 +107,7 @@ core::Result<mapping::MergeEvidence> shared_places(const MapSource& one, const M
   const maps::Map renumbered = maps::renumbered(second.map, numbers);
   parts[1].map = &renumbered;
 
+  // Overlaps are judged as fuse judges them
   const std::vector<mapping::MergeEvidence> found =
       mapping::find_overlaps(parts, mapping::MapFusionOptions(), one.executor());
   if (found.empty()) return tl::unexpected(apart(one, other, "a map has no keyframes"));
@@ -110,7 +115,7 @@ core::Result<mapping::MergeEvidence> shared_places(const MapSource& one, const M
   return tl::unexpected(apart(one, other, "as fuse judges, " + found.front().refused));
 }
 
-/// Shared places say where the second map lies; ICP is to move it no further than such places are wrong.
+/// Shared places give the second map's pose; ICP may move it no further than the error of such places.
 core::Result<Placement> place_by_places(const MapSource& one, const viewer::Points& first,
                                         const MapSource& other, const viewer::Points& second) {
   constexpr double kReach_m = 0.1;
@@ -118,16 +123,19 @@ core::Result<Placement> place_by_places(const MapSource& one, const viewer::Poin
   const auto evidence = shared_places(one, other);
   if (!evidence) return tl::unexpected(evidence.error());
 
+  // ICP begins at the pose that the places give
   const Rigid3 start = one.world_from_map() * evidence->alignment.a_from_b * other.world_from_map().inverse();
   const evaluate::SurfaceSamples moved = samples_of(second);
   const evaluate::CloudFit fit =
       evaluate::fit_cloud(moved, samples_of(first), start, kReach_m, one.executor());
 
+  // The motion of the cloud's middle limits ICP
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3f& p : moved.points) middle += p.cast<double>();
   middle = middle / std::max(1.0, static_cast<double>(moved.points.size())) + moved.shift;
   const bool finer = fit.found && (fit.reference_from_cloud * middle - start * middle).norm() < kMost_m;
 
+  // The page says by which means the maps are aligned
   const std::string how = fmt::format(
       "{} and {} are aligned by places that both show, where {} keyframes agree to {:.0f} mm", first.name,
       second.name, evidence->consistency.agreeing, 1000.0 * evidence->alignment.spread_m);
@@ -163,6 +171,7 @@ core::Result<Placement> place_by_icp(const MapSource& one, const viewer::Points&
 
 }  // namespace
 
+/// The second map's pose by cameras of the same stamps; nothing if there are few or their paths differ.
 std::optional<CommonPoses> common_poses(const std::vector<ExportPose>& first,
                                         const std::vector<ExportPose>& second) {
   constexpr double kSame_s = 5e-4;
@@ -173,6 +182,7 @@ std::optional<CommonPoses> common_poses(const std::vector<ExportPose>& first,
     return a.robot != b.robot ? a.robot < b.robot : a.stamp < b.stamp;
   };
 
+  // Cameras with the same stamp
   PosePairs pairs;
   for (const ExportPose& pose : second) {
     ExportPose wanted = pose;
@@ -182,16 +192,19 @@ std::optional<CommonPoses> common_poses(const std::vector<ExportPose>& first,
     pairs.add(pose.world_from_camera, found->world_from_camera);
   }
 
+  // Least squares over positions and directions
   if (pairs.from.size() < kFewest * kPlacesOfPose) return std::nullopt;
   CommonPoses common;
   common.first_from_second = geometry::align_points(pairs.from, pairs.to);
   common.count = pairs.from.size() / kPlacesOfPose;
   common.rms_m = rms_of(pairs, common.first_from_second, kPlacesOfPose);
 
+  // Larger paths may differ more
   const double most_m = std::max(kApart_m, kApartOfRadius * radius_of(pairs));
   return rms_of(pairs, common.first_from_second, 1) <= most_m ? std::optional(common) : std::nullopt;
 }
 
+/// Aligns by common cameras, else by places that both maps show, else by ICP alone.
 core::Result<Placement> place_second(const MapSource& one, const viewer::Points& first,
                                      const MapSource& other, const viewer::Points& second, bool by_cameras) {
   const auto poses = one.poses(false);
@@ -199,6 +212,7 @@ core::Result<Placement> place_second(const MapSource& one, const viewer::Points&
   std::optional<CommonPoses> common;
   if (by_cameras && poses && other_poses) common = common_poses(*poses, *other_poses);
 
+  // Common cameras are the most accurate
   if (common) {
     return Placement{common->first_from_second,
                      fmt::format("{} and {} are aligned by {} cameras of the same time, which lie {:.1f} mm "

@@ -25,16 +25,19 @@ bool add_stored(const MapSource& source, const std::vector<ExportPose>& poses,
 
 }  // namespace
 
+/// Adds small pictures of keyframes from the store, else from the recording.
 void add_thumbnails(const MapSource& source, const std::vector<ExportPose>& poses, MapView& view) {
   std::vector<viewer::Keyframe>& keyframes = view.scene.keyframes;
   if (!source.has_store() || add_stored(source, poses, keyframes) || !source.request().open) return;
 
+  // The store lacks some pictures
   const auto pictures = Pictures::open(source);
   if (!pictures) {
     view.notes.push_back("without pictures of keyframes: " + pictures.error().message);
     return;
   }
 
+  // Keyframes whose picture is still missing
   source.executor().parallel_for(keyframes.size(), [&](std::size_t i) {
     if (!keyframes[i].jpeg.empty()) return;
     const auto frame = pictures->find(keyframes[i].robot, keyframes[i].stamp);

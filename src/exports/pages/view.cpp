@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A page that holds a map to walk through, and nothing else.
+// A page with a map to walk through.
 #include "plumbline/exports/view.hpp"
 
 #include <fmt/format.h>
@@ -39,6 +39,7 @@ std::vector<std::size_t> one_of_each_cell(const cloud::CloudFile& file, double c
     }
   };
 
+  // Sorted by cell, the most certain point first
   const std::vector<float>& confidence = file.columns.confidence;
   std::vector<Candidate> candidates;
   candidates.reserve(file.cloud->size());
@@ -49,6 +50,7 @@ std::vector<std::size_t> one_of_each_cell(const cloud::CloudFile& file, double c
   }
   std::sort(candidates.begin(), candidates.end());
 
+  // The first of each cell, in the cloud's order
   std::vector<std::size_t> chosen;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     if (i == 0 || candidates[i].cell != candidates[i - 1].cell) chosen.push_back(candidates[i].index);
@@ -94,6 +96,7 @@ std::pair<double, double> middle_range(const std::vector<float>& values) {
   return {at(0.02), at(0.98)};
 }
 
+/// Adds columns of the cloud as layers to colour by.
 void add_layers(const cloud::CloudFile& file, const MapSource& source, viewer::Points& points) {
   const cloud::CloudColumns& columns = file.columns;
   if (!columns.confidence.empty()) {
@@ -103,10 +106,13 @@ void add_layers(const cloud::CloudFile& file, const MapSource& source, viewer::P
     points.layers.push_back(std::move(layer));
   }
 
+  // Standard deviations span decades
   for (const cloud::CloudColumns::Other& other : columns.others) {
     if (other.name != "sigma") continue;
     viewer::Layer layer{"sigma", "Standard deviation", "m", viewer::Scale::kLogarithmic};
     const auto [low, high] = middle_range(other.values);
+
+    // A range without outliers
     layer.low = std::max(low, 1e-5);
     layer.high = std::max(high, 1.1 * layer.low);
     layer.steps = 20;
@@ -114,11 +120,14 @@ void add_layers(const cloud::CloudFile& file, const MapSource& source, viewer::P
     points.layers.push_back(std::move(layer));
   }
 
+  // Names of robots by number
   if (!columns.robot.empty() && source.robots().size() > 1) {
     viewer::Layer layer{"robot", "Robot", "", viewer::Scale::kCategory};
     std::size_t most = 0;
     for (const maps::RobotInfo& robot : source.robots())
       most = std::max(most, static_cast<std::size_t>(std::max(0, robot.number)));
+
+    // Numbers without a robot have no name
     layer.names.resize(most + 1);
     for (const maps::RobotInfo& robot : source.robots())
       layer.names[static_cast<std::size_t>(std::max(0, robot.number))] = robot.name;
@@ -127,6 +136,7 @@ void add_layers(const cloud::CloudFile& file, const MapSource& source, viewer::P
   }
 }
 
+/// The cloud with its layers as the viewer takes it.
 viewer::Points points_of(const cloud::CloudFile& file, const MapSource& source) {
   viewer::Points points;
   points.name = source.name();
@@ -152,11 +162,13 @@ void add_paths(const MapSource& source, viewer::Scene& scene) {
   const auto poses = source.poses(false);
   if (!poses) return;
 
+  // A new path for each robot
   for (std::size_t i = 0; i < poses->size(); ++i) {
     const ExportPose& pose = (*poses)[i];
     const bool begins = scene.paths.empty() || scene.paths.back().robot != pose.robot;
     if (begins) scene.paths.push_back({pose.robot, pose.robot_name, {}, {}});
 
+    // First and last poses stay, others if they differ
     viewer::CameraPath& path = scene.paths.back();
     const bool ends = i + 1 == poses->size() || (*poses)[i + 1].robot != pose.robot;
     if (!begins && !ends) {
@@ -166,6 +178,7 @@ void add_paths(const MapSource& source, viewer::Scene& scene) {
       if (moved < kStep_m && cosine > std::cos(kTurn)) continue;
     }
 
+    // Poses of the thinned path
     path.stamps.push_back(pose.stamp);
     path.world_from_camera.push_back(pose.world_from_camera);
   }
@@ -190,6 +203,7 @@ core::Result<void> add_keyframes(const MapSource& source, const cloud::CloudFile
   const auto poses = source.poses(true);
   if (!poses) return {};
 
+  // Numbers and places of keyframes for views and loops
   std::map<core::KeyframeId, std::size_t> numbers;
   std::map<core::KeyframeId, Eigen::Vector3d> places;
   for (const ExportPose& pose : *poses) {
@@ -200,10 +214,12 @@ core::Result<void> add_keyframes(const MapSource& source, const cloud::CloudFile
     view.scene.keyframes.push_back({pose.robot, pose.stamp, pose.world_from_camera, {}, {}});
   }
 
+  // Pictures and samples of the keyframes' poses
   add_samples(source, *poses, view.scene);
   add_thumbnails(source, *poses, view);
   if (!source.has_store()) return {};
 
+  // The keyframe that saw each point best
   auto seen = best_views(source, file, numbers);
   if (!seen) return tl::unexpected(seen.error());
   if (!seen->empty()) {
@@ -212,6 +228,7 @@ core::Result<void> add_keyframes(const MapSource& source, const cloud::CloudFile
     view.scene.clouds.front().layers.push_back(std::move(layer));
   }
 
+  // Loops between keyframes that are shown
   const auto store = source.store("loops");
   for (const maps::LoopEdge& loop : (*store)->stored().map.loops()) {
     const auto a = places.find(loop.a);
@@ -240,6 +257,7 @@ void add_plan(MapSource& source, MapView& view) {
     return;
   }
 
+  // Faces of walls between their openings
   const double height = source.floor_m() + source.options().cut_m;
   const auto at = [&](const Eigen::Vector2d& p) { return Eigen::Vector3d(p.x(), p.y(), height); };
   for (const WallLine& wall : plan->walls) {
@@ -251,12 +269,14 @@ void add_plan(MapSource& source, MapView& view) {
     scene.walls.emplace_back(at(wall.at(from)), at(wall.at(wall.s1)));
   }
 
+  // Windows are not passages
   for (const WallDoor& door : plan->doors) {
     if (door.kind == OpeningKind::kWindow) continue;
     scene.doors.emplace_back(at(0.5 * (door.jambs[0] + door.far_jambs[0])),
                              at(0.5 * (door.jambs[1] + door.far_jambs[1])));
   }
 
+  // Areas of rooms, and the plan as a drawing
   for (const WallRoom& room : plan->rooms)
     scene.rooms.emplace_back(at(room.label),
                              fmt::format("{}{:.2f} m²", room.closed ? "" : "≥ ", room.area_m2));
@@ -278,6 +298,7 @@ core::Result<std::pair<cloud::CloudFile, viewer::Points>> shown_cloud(MapSource&
   return std::pair(std::move(file), std::move(points));
 }
 
+/// The whole scene: cloud, paths, keyframes, lines and plan.
 core::Result<MapView> view_of(MapSource& source) {
   auto cloud = shown_cloud(source);
   if (!cloud) return tl::unexpected(cloud.error());
@@ -289,6 +310,7 @@ core::Result<MapView> view_of(MapSource& source) {
   scene.floor_m = source.floor_m();
   scene.clouds.push_back(std::move(cloud->second));
 
+  // Parts that the map lacks are left out
   add_paths(source, scene);
   if (auto added = add_keyframes(source, cloud->first, view); !added) return tl::unexpected(added.error());
   add_lines(source, scene);
@@ -296,7 +318,7 @@ core::Result<MapView> view_of(MapSource& source) {
   return view;
 }
 
-/// Whether a file is a page of the viewer.
+/// True if a file is a page of the viewer.
 bool is_view(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   std::string head(512, '\0');
@@ -304,6 +326,7 @@ bool is_view(const std::filesystem::path& file) {
   return head.rfind("<!DOCTYPE html>", 0) == 0 && head.find(kViewGenerator) != std::string::npos;
 }
 
+/// Writes the page; only pages of maps are replaced.
 core::Result<ExportSummary> write_view(MapSource& source, const std::filesystem::path& output) {
   std::error_code ec;
   if (std::filesystem::is_regular_file(output, ec) && !is_view(output)) {
@@ -319,6 +342,7 @@ core::Result<ExportSummary> write_view(MapSource& source, const std::filesystem:
   const std::string page = viewer::page(view->scene, kViewGenerator, &cost);
   if (auto written = core::write_file(output, page); !written) return tl::unexpected(written.error());
 
+  // Facts about the page's size
   ExportSummary summary;
   summary.written = {output};
   summary.notes = std::move(view->notes);
@@ -326,6 +350,7 @@ core::Result<ExportSummary> write_view(MapSource& source, const std::filesystem:
     return static_cast<double>(bytes) / static_cast<double>(std::max<std::size_t>(1, cost.points));
   };
 
+  // Bytes of each part for one point
   summary.notes.push_back(fmt::format(
       "{} points{}, {:.1f} MB: {:.2f} bytes a point for place and colour, {:.2f} for normals, "
       "{:.2f} for {} further layers",
@@ -345,9 +370,11 @@ core::Result<MapView> view_of(const ExportRequest& request, const core::Executor
   return view_of(*source);
 }
 
+/// Both maps in the frame of the first, coloured by distance.
 core::Result<MapView> view_of_two(const ExportRequest& first, const ExportRequest& second,
                                   const core::Executor& executor, core::Log& log,
                                   const ExportProgress& progress, bool by_cameras) {
+  // Both maps with their clouds
   auto one = MapSource::open(first, executor, log, progress);
   if (!one) return tl::unexpected(one.error());
   auto other = MapSource::open(second, executor, log, progress);
@@ -357,6 +384,7 @@ core::Result<MapView> view_of_two(const ExportRequest& first, const ExportReques
   auto added = shown_cloud(*other);
   if (!added) return tl::unexpected(added.error());
 
+  // The second cloud is moved into the first one's frame
   viewer::Scene& scene = view->scene;
   if (added->second.name == scene.clouds.front().name) added->second.name += " (second)";
   const auto placed = place_second(*one, scene.clouds.front(), *other, added->second, by_cameras);
@@ -367,6 +395,7 @@ core::Result<MapView> view_of_two(const ExportRequest& first, const ExportReques
   scene.placing = placed->how;
   view->notes.push_back(placed->how);
 
+  // Distances need the aligned clouds
   add_distances(scene.clouds.front(), added->second, executor);
   scene.clouds.push_back(std::move(added->second));
   return view;

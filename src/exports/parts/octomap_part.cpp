@@ -25,10 +25,13 @@ void add_free(const ViewRays& view, const Eigen::AlignedBox3d& box, Tree& tree) 
   octomap::KeyRay ray;
   octomap::OcTreeKey key;
 
+  // Rays that end in the same cell count once
   for (const Eigen::Vector3f& end : view.ends) {
     const Eigen::Vector3d way = end.cast<double>() - view.origin;
     const double length_m = way.norm();
     if (length_m <= margin_m) continue;
+
+    // Up to one cell before the surface
     const octomap::point3d last = point3d_of(view.origin + (1.0 - margin_m / length_m) * way);
     if (!tree.coordToKeyChecked(last, key) || !ends.insert(key).second) continue;
     if (!tree.computeRayKeys(point3d_of(view.origin), last, ray)) continue;
@@ -36,6 +39,7 @@ void add_free(const ViewRays& view, const Eigen::AlignedBox3d& box, Tree& tree) 
     free.insert(key);
   }
 
+  // Free cells in the selected box
   for (const octomap::OcTreeKey& cell : free) {
     const octomap::point3d at = tree.keyToCoord(cell);
     if (box.contains(Eigen::Vector3d(at.x(), at.y(), at.z()))) tree.updateNode(cell, false, true);
@@ -54,6 +58,7 @@ void add_occupied(const cloud::CloudFile& file, Tree& tree, const Color& color) 
   }
 }
 
+/// Free cells first: points then override rays that grazed their cells.
 template <typename Tree, typename Color>
 core::Result<void> fill(const OctreeWork& work, Tree& tree, const Color& color) {
   auto seen = work.views([&](const ViewRays& view) -> core::Result<void> {
@@ -61,6 +66,8 @@ core::Result<void> fill(const OctreeWork& work, Tree& tree, const Color& color) 
     return {};
   });
   if (!seen) return seen;
+
+  // Inner nodes summarise their children
   add_occupied(*work.cloud, tree, color);
   tree.updateInnerOccupancy();
   tree.prune();
@@ -75,6 +82,7 @@ void put_head(const char* first_line, const OctreeWork& work, const Tree& tree, 
       << tree.getResolution() << "\ndata\n";
 }
 
+/// The bytes of an octree, with colours or as a binary tree.
 core::Result<std::string> make_octree(const OctreeWork& work) {
   std::ostringstream bytes;
   if (work.color) {
@@ -84,6 +92,7 @@ core::Result<std::string> make_octree(const OctreeWork& work) {
     };
     if (auto filled = fill(work, tree, paint); !filled) return tl::unexpected(filled.error());
 
+    // Colours need the full tree
     put_head("# Octomap OcTree file", work, tree, bytes);
     tree.writeData(bytes);
   } else {
@@ -91,6 +100,7 @@ core::Result<std::string> make_octree(const OctreeWork& work) {
     const auto nothing = [](octomap::OcTree&, const octomap::OcTreeKey&, const cloud::Point&) {};
     if (auto filled = fill(work, tree, nothing); !filled) return tl::unexpected(filled.error());
 
+    // The binary tree holds occupied and free only
     tree.toMaxLikelihood();
     tree.prune();
     put_head("# Octomap OcTree binary file", work, tree, bytes);

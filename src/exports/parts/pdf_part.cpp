@@ -32,6 +32,7 @@ void set_color(cairo_t* cairo, const std::string& color) {
   cairo_set_source_rgb(cairo, channel(1), channel(3), channel(5));
 }
 
+/// A line or an area in millimetres of the sheet.
 void draw_line(cairo_t* cairo, const DrawnLine& line, const DrawingSheet& sheet) {
   constexpr double kDashes[] = {2.0, 1.2};
   for (std::size_t i = 0; i < line.points.size(); ++i) {
@@ -62,6 +63,7 @@ void draw_text(cairo_t* cairo, const DrawnText& text, double width_m, const Draw
   cairo_restore(cairo);
 }
 
+/// Lines and texts of a page, layer by layer.
 void draw_page(cairo_t* cairo, const PdfFunctions::Page& page) {
   const Drawing& drawing = *page.drawing;
   for (std::size_t layer = 0; layer < drawing.layers.size(); ++layer) {

@@ -38,6 +38,7 @@ bool in_metres(PJ_CONTEXT* context, const PJ* system) {
          factor == 1.0;
 }
 
+/// Name and well-known text of a projected system in metres.
 core::Result<void> describe_system(int epsg, Georeference& reference) {
   const Context context = quiet_context();
   const Pj system(proj_create(context.get(), fmt::format("EPSG:{}", epsg).c_str()));
@@ -48,6 +49,8 @@ core::Result<void> describe_system(int epsg, Georeference& reference) {
         "UTM zone, 32601 to 32760",
         epsg, proj_get_name(system.get())));
   }
+
+  // WKT 1 as GDAL writes it, in one line
   const char* const options[] = {"MULTILINE=NO", nullptr};
   const char* text = proj_as_wkt(context.get(), system.get(), PJ_WKT1_GDAL, options);
   if (text == nullptr)
@@ -63,6 +66,7 @@ Pj from_degrees_into(PJ_CONTEXT* context, int epsg) {
   return Pj(given ? proj_normalize_for_visualization(context, given.get()) : nullptr);
 }
 
+/// True if the origin is in the system's area of use, or that is not known.
 bool covers_origin(const Georeference& reference) {
   constexpr double kSlack = 3.0;       // degrees: zones are used a little beyond their border
   constexpr double kUnknown = -999.0;  // PROJ gives -1000 for a border that it does not know
@@ -74,6 +78,7 @@ bool covers_origin(const Georeference& reference) {
                      proj_get_area_of_use(context.get(), system.get(), &west, &south, &east, &north, nullptr);
   if (!known || std::min({west, south, east, north}) < kUnknown) return true;
 
+  // Degrees of the origin; longitudes wrap around
   const PJ_COORD at = proj_trans(from_degrees.get(), PJ_INV,
                                  proj_coord(reference.origin.x(), reference.origin.y(), 0.0, 0.0));
   if (!std::isfinite(at.xy.x + at.xy.y) || at.xy.y < south - kSlack || at.xy.y > north + kSlack) return false;

@@ -6,6 +6,7 @@
 
 namespace plumbline::exports {
 
+/// Lines of the result's file, else of the store, in the frame of exports.
 core::Result<std::vector<maps::LineSegment3>> lines_of(const MapSource& source) {
   std::error_code ec;
   const auto& result = source.place().result;
@@ -22,6 +23,7 @@ core::Result<std::vector<maps::LineSegment3>> lines_of(const MapSource& source) 
 
 namespace {
 
+/// Writes lines that are wholly in the selected part.
 core::Result<ExportSummary> write_lines(MapSource& source, const std::filesystem::path& output) {
   auto lines = lines_of(source);
   if (!lines) return tl::unexpected(lines.error());

@@ -9,6 +9,7 @@
 
 namespace plumbline::exports {
 
+/// The camera's pose in the body of --body; the identity without it.
 core::Result<geometry::Rigid3> body_from_camera_of(const ExportOptions& options) {
   const std::vector<double>& body = options.body;
   if (body.empty()) return geometry::Rigid3{};
@@ -19,12 +20,14 @@ core::Result<geometry::Rigid3> body_from_camera_of(const ExportOptions& options)
   return geometry::Rigid3(turn, {body[0], body[1], body[2]});
 }
 
+/// Selected paths of camera or body, one for each robot.
 core::Result<std::vector<std::vector<ExportPose>>> paths_of(const MapSource& source) {
   const auto body_from_camera = body_from_camera_of(source.options());
   if (!body_from_camera) return tl::unexpected(body_from_camera.error());
   auto poses = source.poses(source.request().content == Content::kKeyframes);
   if (!poses) return tl::unexpected(poses.error());
 
+  // Poses are sorted by robot
   const geometry::Rigid3 camera_from_body = body_from_camera->inverse();
   std::vector<std::vector<ExportPose>> paths;
   for (ExportPose& pose : *poses) {
@@ -41,11 +44,13 @@ std::string robot_comment(const std::vector<ExportPose>& path) {
              : fmt::format("# robot {}\n", core::printable(path.front().robot_name));
 }
 
+/// Writes all paths into one file, or each into a file of a folder.
 core::Result<ExportSummary> write_robot_files(const MapSource& source, const std::filesystem::path& output,
                                               const std::string& ending, const WritePaths& write) {
   const auto paths = paths_of(source);
   if (!paths) return tl::unexpected(paths.error());
 
+  // A name with an ending is one file
   ExportSummary summary;
   if (output.has_extension()) {
     core::OutputFile out(output);
@@ -56,6 +61,7 @@ core::Result<ExportSummary> write_robot_files(const MapSource& source, const std
   }
   if (auto made = core::make_folder(output); !made) return tl::unexpected(made.error());
 
+  // A file for each robot, named after it
   for (const auto& path : *paths) {
     const std::string& robot = path.front().robot_name;
     const std::filesystem::path file =

@@ -19,6 +19,7 @@ std::string path_head(const MapSource& source, const std::string& what) {
                      body ? "the body" : "the camera (x right, y down, z ahead)", source.frame_text());
 }
 
+/// TUM: a row of stamp, position and quaternion.
 core::Result<ExportSummary> write_tum(MapSource& source, const std::filesystem::path& output) {
   return write_robot_files(source, output, ".txt", [&](core::OutputFile& out, const auto& paths) {
     out.write(path_head(source, "stamp tx ty tz qx qy qz qw"));
@@ -34,6 +35,7 @@ core::Result<ExportSummary> write_tum(MapSource& source, const std::filesystem::
   });
 }
 
+/// KITTI: the upper 3 x 4 part of each pose matrix as a row, without stamps.
 core::Result<ExportSummary> write_kitti(MapSource& source, const std::filesystem::path& output) {
   const auto paths = paths_of(source);
   if (!paths) return tl::unexpected(paths.error());
@@ -44,6 +46,7 @@ core::Result<ExportSummary> write_kitti(MapSource& source, const std::filesystem
         output.string(), paths->size()));
   }
 
+  // Matrices by rows
   return write_robot_files(source, output, ".kitti", [](core::OutputFile& out, const auto& all) {
     for (const auto& path : all) {
       for (const ExportPose& pose : path) {
@@ -58,6 +61,7 @@ core::Result<ExportSummary> write_kitti(MapSource& source, const std::filesystem
   });
 }
 
+/// EuRoC: stamps in nanoseconds, quaternions with w first.
 core::Result<ExportSummary> write_euroc(MapSource& source, const std::filesystem::path& output) {
   return write_robot_files(source, output, ".csv", [](core::OutputFile& out, const auto& paths) {
     out.write(
@@ -75,14 +79,17 @@ core::Result<ExportSummary> write_euroc(MapSource& source, const std::filesystem
   });
 }
 
+/// Paths as vertices and edges for viewers.
 core::Result<ExportSummary> write_path(MapSource& source, const std::filesystem::path& output) {
   const auto paths = paths_of(source);
   if (!paths) return tl::unexpected(paths.error());
 
+  // Vertices of all paths
   std::array<std::vector<float>, 3> xyz;
   cloud::PlyData data;
   data.comments = {"plumbline, metres", source.frame_text()};
 
+  // Edges join poses of one robot only
   std::uint32_t index = 0;
   for (const auto& path : *paths) {
     for (std::size_t i = 0; i < path.size(); ++i, ++index) {
@@ -92,6 +99,7 @@ core::Result<ExportSummary> write_path(MapSource& source, const std::filesystem:
     }
   }
 
+  // Position by columns, as PLY takes them
   data.add("x", std::move(xyz[0]));
   data.add("y", std::move(xyz[1]));
   data.add("z", std::move(xyz[2]));

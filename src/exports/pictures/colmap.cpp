@@ -35,6 +35,7 @@ struct ColmapModel {
 
 std::uint32_t camera_id(std::int32_t robot) { return static_cast<std::uint32_t>(robot + 1); }
 
+/// Features of each keyframe's picture, with the landmarks that they show.
 std::vector<std::vector<ColmapSpot>> spots_of(const maps::Map& map, const ColmapModel& model) {
   std::vector<std::vector<ColmapSpot>> spots(model.pictures.size());
   for (std::size_t i = 0; i < model.pictures.size(); ++i) {
@@ -43,6 +44,8 @@ std::vector<std::vector<ColmapSpot>> spots_of(const maps::Map& map, const Colmap
     for (const auto& feature : map.keyframe(keyframe).features->points)
       spots[i].push_back({feature.pixel.x() + kHalfPixel, feature.pixel.y() + kHalfPixel, kNoPoint});
   }
+
+  // COLMAP counts points from one
   for (std::size_t p = 0; p < model.points.size(); ++p) {
     for (const ModelPoint::Sight& sight : model.points[p].track)
       spots[sight.picture][static_cast<std::size_t>(sight.feature)].point = p + 1;
@@ -50,10 +53,12 @@ std::vector<std::vector<ColmapSpot>> spots_of(const maps::Map& map, const Colmap
   return spots;
 }
 
+/// Writes cameras, images and points as COLMAP's binary files.
 core::Result<void> write_colmap_binary(const std::filesystem::path& folder, const ColmapModel& model) {
   core::OutputFile cameras(folder / "cameras.bin");
   cameras.put(std::uint64_t{model.robots.size()});
 
+  // The principal point moves by half a pixel
   for (const maps::RobotInfo& robot : model.robots) {
     const sensor::Pinhole& c = robot.camera.color;
     cameras.put(camera_id(robot.number));
@@ -63,6 +68,7 @@ core::Result<void> write_colmap_binary(const std::filesystem::path& folder, cons
     cameras.put(std::array<double, 4>{c.fx, c.fy, c.cx + kHalfPixel, c.cy + kHalfPixel});
   }
 
+  // Images with their features
   core::OutputFile images(folder / "images.bin");
   images.put(std::uint64_t{model.pictures.size()});
 
@@ -77,12 +83,14 @@ core::Result<void> write_colmap_binary(const std::filesystem::path& folder, cons
     images.put('\0');
     images.put(std::uint64_t{model.spots[i].size()});
 
+    // Features without a point have the number -1
     for (const ColmapSpot& spot : model.spots[i]) {
       images.put(std::array<double, 2>{spot.x, spot.y});
       images.put(spot.point);
     }
   }
 
+  // Points with their tracks
   core::OutputFile points(folder / "points3D.bin");
   points.put(std::uint64_t{model.points.size()});
 
@@ -94,17 +102,20 @@ core::Result<void> write_colmap_binary(const std::filesystem::path& folder, cons
     points.put(point.error_px);
     points.put(std::uint64_t{point.track.size()});
 
+    // The track: image and feature of each observation
     for (const ModelPoint::Sight& sight : point.track) {
       points.put(static_cast<std::uint32_t>(sight.picture + 1));
       points.put(static_cast<std::uint32_t>(sight.feature));
     }
   }
 
+  // A file that cannot be written fails the model
   if (auto done = cameras.commit(); !done) return done;
   if (auto done = images.commit(); !done) return done;
   return points.commit();
 }
 
+/// Writes cameras, images and points as COLMAP's text files.
 core::Result<void> write_colmap_text(const std::filesystem::path& folder, const ColmapModel& model,
                                      const std::string& frame) {
   core::OutputFile cameras(folder / "cameras.txt");
@@ -115,6 +126,7 @@ core::Result<void> write_colmap_text(const std::filesystem::path& folder, const 
                               c.fx, c.fy, c.cx + kHalfPixel, c.cy + kHalfPixel));
   }
 
+  // Images take two rows each
   core::OutputFile images(folder / "images.txt");
   images.write(
       fmt::format("# {}\n# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n"
@@ -128,6 +140,7 @@ core::Result<void> write_colmap_text(const std::filesystem::path& folder, const 
     images.write(fmt::format("{} {} {} {} {} {} {} {} {} {}.png\n", i + 1, q.w(), q.x(), q.y(), q.z(), t.x(),
                              t.y(), t.z(), camera_id(model.pictures[i].pose.robot), model.pictures[i].name));
 
+    // The second row: features and their points
     const char* between = "";
     for (const ColmapSpot& spot : model.spots[i]) {
       images.write(spot.point == kNoPoint ? fmt::format("{}{} {} -1", between, spot.x, spot.y)
@@ -138,6 +151,7 @@ core::Result<void> write_colmap_text(const std::filesystem::path& folder, const 
     images.write("\n");
   }
 
+  // Points with their tracks
   core::OutputFile points(folder / "points3D.txt");
   points.write("# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n");
 
@@ -151,20 +165,24 @@ core::Result<void> write_colmap_text(const std::filesystem::path& folder, const 
     points.write("\n");
   }
 
+  // A file that cannot be written fails the model
   if (auto done = cameras.commit(); !done) return done;
   if (auto done = images.commit(); !done) return done;
   return points.commit();
 }
 
+/// Writes a model with the pictures, or with poses only if there are none.
 core::Result<ExportSummary> write_colmap(MapSource& source, const std::filesystem::path& output) {
   const auto store = source.store("the tracks of landmarks");
   if (!store) return tl::unexpected(store.error());
 
+  // Pictures may be missing, poses may not
   ExportSummary summary;
   const std::unique_ptr<Pictures> recordings = open_pictures(source, summary);
   auto pictures = pictures_of(source, recordings.get());
   if (!pictures) return tl::unexpected(pictures.error());
 
+  // Cameras, pictures and points of the model
   ColmapModel model;
   model.robots = source.robots();
   model.pictures = std::move(*pictures);
@@ -173,6 +191,7 @@ core::Result<ExportSummary> write_colmap(MapSource& source, const std::filesyste
   model.points = std::move(*points);
   model.spots = spots_of((*store)->stored().map, model);
 
+  // The folder appears only when it is complete
   auto folder = prepare_export(output, source.request().replace);
   if (!folder) return tl::unexpected(folder.error());
 
@@ -183,9 +202,11 @@ core::Result<ExportSummary> write_colmap(MapSource& source, const std::filesyste
                                     : write_colmap_binary(sparse, model);
   }
 
+  // Undistorted pictures next to the model
   if (written && recordings)
     written = write_pictures(source, *recordings, model.pictures, folder->path(), false, summary);
 
+  // The note marks the folder as an export
   if (written) {
     written = core::write_file(
         folder->path() / kExportNote,
@@ -196,6 +217,8 @@ core::Result<ExportSummary> write_colmap(MapSource& source, const std::filesyste
 
   if (written) written = folder->commit();
   if (!written) return tl::unexpected(written.error());
+
+  // The summary tells how many poses have a picture
   summary.written = {output};
   summary.notes.push_back(fmt::format("{}, {} points", pictures_text(model.pictures), model.points.size()));
   return summary;

@@ -91,6 +91,7 @@ void keep_what_fits(const MapSource& source, const maps::Map& map, const std::ve
   point.error_px = point.track.empty() ? 0.0 : sum / static_cast<double>(point.track.size());
 }
 
+/// Depth as 16-bit millimetres; values out of range become 0.
 cv::Mat in_millimetres(const cv::Mat& depth_m) {
   constexpr float kMost_m = 65.5F;
   cv::Mat result(depth_m.size(), CV_16UC1, cv::Scalar(0));
@@ -111,21 +112,26 @@ sensor::Pinhole pinhole_of(const MapSource& source, std::int32_t robot) {
   return maps::camera_of(source.robots(), robot).color;
 }
 
+/// Landmarks with their tracks in the pictures.
 core::Result<std::vector<ModelPoint>> landmark_points(MapSource& source,
                                                       const std::vector<Picture>& pictures) {
   const auto store = source.store("landmarks");
   if (!store) return tl::unexpected(store.error());
 
+  // Pictures of keyframes
   const maps::Map& map = (*store)->stored().map;
   std::map<core::KeyframeId, std::size_t> picture_of;
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     if (pictures[i].pose.keyframe.valid()) picture_of[pictures[i].pose.keyframe] = i;
   }
 
+  // Landmarks have no colour, the cloud has
   const auto cloud = source.cloud();
   cloud::CloudFile none;
   none.cloud = std::make_shared<cloud::Cloud>();
   const ColorCells colors(cloud ? **cloud : none);
+
+  // Landmarks of one observation are not certain
   std::vector<ModelPoint> points;
   for (const core::PointId id : map.point_ids()) {
     const maps::MapPoint& landmark = map.point(id);
@@ -133,11 +139,13 @@ core::Result<std::vector<ModelPoint>> landmark_points(MapSource& source,
     point.position = source.world_from_map() * landmark.position;
     if (landmark.observations.size() < 2 || !source.selects(point.position)) continue;
 
+    // Observations in pictures of the model
     for (const maps::Observation& observation : landmark.observations) {
       const auto picture = picture_of.find(observation.keyframe);
       if (picture != picture_of.end()) point.track.push_back({picture->second, observation.feature});
     }
 
+    // Outliers are removed from tracks
     const bool seen = point.track.size() >= 2;  // otherwise the model has too few of its keyframes
     keep_what_fits(source, map, pictures, point);
     if (seen && point.track.size() < 2) continue;
@@ -150,6 +158,7 @@ core::Result<std::vector<ModelPoint>> landmark_points(MapSource& source,
   return points;
 }
 
+/// Points of the cloud, evenly taken, without tracks.
 core::Result<std::vector<ModelPoint>> dense_points(MapSource& source, int count) {
   const auto file = source.cloud();
   if (!file) return tl::unexpected(file.error());
@@ -171,6 +180,7 @@ core::Result<std::vector<ModelPoint>> model_points(MapSource& source, const std:
   return dense > 0 ? dense_points(source, dense) : landmark_points(source, pictures);
 }
 
+/// Writes the pictures as PNG, and depth if it is wanted and known.
 core::Result<void> write_pictures(const MapSource& source, const Pictures& recordings,
                                   std::vector<Picture>& pictures, const std::filesystem::path& folder,
                                   bool depth, ExportSummary& summary) {
@@ -179,6 +189,7 @@ core::Result<void> write_pictures(const MapSource& source, const Pictures& recor
     if (auto made = core::make_folder(folder / "depth"); !made) return made;
   }
 
+  // Pictures are written in parallel, block by block
   constexpr std::size_t kAtOnce = 16;  // for progress reports and bounded memory
   std::vector<core::Result<void>> written(pictures.size());
   std::vector<std::string> lost(pictures.size());
@@ -188,12 +199,14 @@ core::Result<void> write_pictures(const MapSource& source, const Pictures& recor
       const std::size_t i = first + k;
       if (!pictures[i].frame) return;
 
+      // Damaged pictures are reported at the end
       const auto frame = recordings.read(pictures[i].pose.robot, *pictures[i].frame);
       if (!frame) {
         lost[i] = frame.error().message;
         return;
       }
 
+      // Depth has the name of its colour image
       const std::string file = pictures[i].name + ".png";
       written[i] = dataset::write_png(folder / "images" / file, frame->color);
       if (written[i] && depth && !recordings.stored())
@@ -202,6 +215,7 @@ core::Result<void> write_pictures(const MapSource& source, const Pictures& recor
     source.progress(first + count, pictures.size());
   }
 
+  // The first failure is reported, whatever the threads' order
   std::size_t missing = 0;
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     if (!written[i]) return written[i];
@@ -209,6 +223,7 @@ core::Result<void> write_pictures(const MapSource& source, const Pictures& recor
     if (!pictures[i].frame) ++missing;
   }
 
+  // Notes about what is missing
   if (depth && recordings.stored())
     summary.notes.push_back(
         "without depth images: the map keeps colour only; name the recording with --recording");

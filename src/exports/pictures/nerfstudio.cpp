@@ -25,6 +25,7 @@ Json rows_of(const Eigen::Matrix4d& m, int rows) {
   return json;
 }
 
+/// Intrinsics; pixels have their middle at (0.5, 0.5).
 void put_intrinsics(const sensor::Pinhole& camera, Json& json) {
   json["fl_x"] = camera.fx;
   json["fl_y"] = camera.fy;
@@ -34,21 +35,26 @@ void put_intrinsics(const sensor::Pinhole& camera, Json& json) {
   json["h"] = camera.height;
 }
 
+/// The content of transforms.json.
 Json transforms_json(const MapSource& source, const std::vector<Picture>& pictures, bool depth) {
   Json json;
   json["comment"] = source.frame_text() + "; cameras in OpenGL's axes: x right, y up, z backwards";
   json["camera_model"] = "PINHOLE";
 
+  // One camera's intrinsics are given once
   const bool one_camera = source.robots().size() == 1;
   if (one_camera) put_intrinsics(pinhole_of(source, source.robots().front().number), json);
   json["applied_transform"] = rows_of(Eigen::Matrix4d::Identity(), 3);
   json["ply_file_path"] = "points.ply";
   json["frames"] = Json::array();
 
+  // OpenGL's y and z axes point the other way
   for (const Picture& picture : pictures) {
     Eigen::Matrix4d pose = picture.pose.world_from_camera.isometry().matrix();
     pose.col(1) *= -1.0;
     pose.col(2) *= -1.0;
+
+    // Depth only for pictures that have it
     Json frame;
     frame["file_path"] = "images/" + picture.name + ".png";
     if (picture.frame && depth) frame["depth_file_path"] = "depth/" + picture.name + ".png";
@@ -60,6 +66,7 @@ Json transforms_json(const MapSource& source, const std::vector<Picture>& pictur
   return json;
 }
 
+/// Points from which splatting starts, as PLY.
 core::Result<void> write_start_points(MapSource& source, const std::vector<Picture>& pictures,
                                       const std::filesystem::path& file) {
   const auto points = model_points(source, pictures);

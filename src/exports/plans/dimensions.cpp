@@ -23,7 +23,7 @@ bool continues(const DimensionRun& run, const Eigen::Vector2d& to) {
   return way.dot(run.along()) > 0.0 && std::abs(way.dot(run.inward())) < kStraight;
 }
 
-/// Sides of a room from corner to corner, as far as they are no limit of what was seen.
+/// Sides of a room from corner to corner, without the limits of what was observed.
 std::vector<DimensionRun> runs_of(const WallRoom& room) {
   std::vector<DimensionRun> runs;
   const std::size_t count = room.outline.size();
@@ -62,20 +62,25 @@ double common_share(const WallLine& wall, const DimensionRun& run) {
   return (std::min(std::max(s0, s1), run.length()) - std::max(std::min(s0, s1), 0.0)) / wall.length();
 }
 
+/// Runs that get dimensions, the longest first: sides of rooms, and walls that belong to no room.
 std::vector<DimensionRun> all_runs(const WallPlan& plan, double unit) {
   constexpr double kShortest_m = 0.3, kLeastNew = 0.5;
   std::vector<DimensionRun> runs;
+
+  // Sides of rooms come first, for they are cut to the room
   for (const WallRoom& room : plan.rooms) {
     const auto more = runs_of(room);
     runs.insert(runs.end(), more.begin(), more.end());
   }
 
+  // Walls that are mostly new
   for (const WallLine& wall : plan.walls) {
     double share = 0.0;
     for (const DimensionRun& run : runs) share += std::max(0.0, common_share(wall, run));
     if (share < kLeastNew) runs.push_back({wall.at(wall.s1), wall.at(wall.s0)});
   }
 
+  // Short runs have no room for a text
   runs.erase(std::remove_if(runs.begin(), runs.end(),
                             [&](const DimensionRun& run) { return run.length() < kShortest_m * unit; }),
              runs.end());
@@ -132,6 +137,7 @@ class DimensionChain {
   void place_texts() {
     LabelPlaces places(drawing_);
     for (const DrawnDimension& d : dimensions_) {
+      // Texts must avoid all lines of dimensions
       for (const DrawnLine& line : lines_of(d)) places.add(line);
     }
 
@@ -140,12 +146,15 @@ class DimensionChain {
       const Eigen::Vector2d across(-along.y(), along.x());
       const double width = d.label.width_m(), length = (d.to - d.from).norm();
       std::vector<Eigen::Vector2d> near, far;
+
+      // Places over and under the line, the middle first
       for (const double share : {0.0, 0.12, -0.12, 0.25, -0.25, 0.36, -0.36}) {
         if (width + 2.0 * std::abs(share) * length > 0.95 * length) continue;
         for (const double side : {0.95, -0.95})
           near.emplace_back(middle + share * length * along + side * d.label.height_m * across);
       }
 
+      // A text that does not fit gets a leader
       if (!places.place(d.label, near)) {
         for (const Eigen::Vector2d& at : places_around(middle, style_.mm, 45.0 * style_.mm)) {
           if (places.is_free(middle, at)) far.push_back(at);
@@ -182,6 +191,7 @@ void draw_dimensions(const WallPlan& plan, const PlanStyle& style, const PlanLay
         std::any_of(done.begin(), done.end(), [&](const auto& other) { return is_same(other, run); });
     if (again && !with_openings) continue;
 
+    // The chain of jambs is nearer to the wall than the total
     places.insert(places.end(), {0.0, run.length()});
     std::sort(places.begin(), places.end());
     const auto at = [&](double s) { return Eigen::Vector2d(run.from + s * run.along()); };
@@ -189,6 +199,8 @@ void draw_dimensions(const WallPlan& plan, const PlanStyle& style, const PlanLay
       if (places[i + 1] - places[i] > kNone_m)
         chain.draw(at(places[i]), at(places[i + 1]), first * run.inward());
     }
+
+    // A length is drawn once, even if two walls have it
     if (!again) chain.draw(run.from, run.to, (with_openings ? second : first) * run.inward());
     if (!again) done.push_back(run);
   }

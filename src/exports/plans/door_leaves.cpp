@@ -19,12 +19,15 @@ struct Upright {
   double z;
 };
 
+/// Points next to the opening that may belong to a leaf: upright, at its height and not on a wall.
 std::vector<Upright> upright_beside(const NearPoints& points, const WallDoor& door,
                                     const std::vector<WallLine>& walls) {
   constexpr double kAtWall_m = 0.045;
   const Eigen::Vector2d along = (door.jambs[1] - door.jambs[0]).normalized();
   const Eigen::Vector2d front(along.y(), -along.x());
   std::vector<Upright> found;
+
+  // Outside the thickness of the wall that has the door
   for (std::size_t i = 0; i < points.places.size(); ++i) {
     const Eigen::Vector3d& p = points.places[i];
     const Eigen::Vector3d& n = points.normals[i];
@@ -32,6 +35,7 @@ std::vector<Upright> upright_beside(const NearPoints& points, const WallDoor& do
         (p.y() < kAtWall_m && p.y() > -door.depth_m() - kAtWall_m))
       continue;
 
+    // Other walls near by are not leaves
     const Eigen::Vector2d place = door.jambs[0] + p.x() * along + p.y() * front;
     const bool at_wall = std::any_of(walls.begin(), walls.end(), [&](const WallLine& wall) {
       const double s = wall.along().dot(place);
@@ -52,6 +56,7 @@ double filled_share(const std::vector<Upright>& points, const Eigen::Vector2d& h
   heights.fill({1e300, -1e300});
   const Eigen::Vector2d across(-way.y(), way.x());
 
+  // Range of heights in each bin along the leaf
   for (const Upright& p : points) {
     const double r = way.dot(p.at - hinge);
     if (r < 0.0 || r >= kMostBins * kBin_m || std::abs(across.dot(p.at - hinge)) > kOff_m ||
@@ -62,6 +67,7 @@ double filled_share(const std::vector<Upright>& points, const Eigen::Vector2d& h
     high = std::max(high, p.z);
   }
 
+  // Something longer than the leaf's width is no leaf
   double filled = 0.0, all = 0.0, beyond = 0.0;
   for (std::size_t i = 0; i < kMostBins; ++i) {
     const double r = (static_cast<double>(i) + 0.5) * kBin_m;
@@ -99,9 +105,12 @@ void find_leaves(const cloud::Cloud& cloud, double floor_m, const std::vector<Wa
 
   for (WallDoor& door : doors) {
     if (door.kind != OpeningKind::kDoor || door.width_m > kWidest_m) continue;
+
+    // Points within the reach of the leaf
     const auto points = upright_beside(points_near(cloud, floor_m, door, door.width_m + 0.3), door, walls);
     double best = kLeastFilled;
 
+    // Both hinges, both sides, all angles
     for (int hinge = 0; hinge < 2; ++hinge) {
       for (const bool front : {true, false}) {
         const Eigen::Vector2d at(hinge == 0 ? 0.0 : door.width_m, front ? 0.0 : -door.depth_m());
@@ -141,6 +150,8 @@ std::vector<WallDoor> windows_of(const cloud::Cloud& cloud, double floor_m, doub
       if ((!window.jamb_seen[0] && !window.jamb_seen[1]) || !sill || *sill < kLowestSill_m) continue;
       window.sill_m = *sill;
       window.head_m = head.value_or(0.0);
+
+      // The same window seen from the wall's other face
       const Eigen::Vector2d middle = 0.5 * (window.jambs[0] + window.jambs[1]);
       const bool again = std::any_of(windows.begin(), windows.end(), [&](const WallDoor& other) {
         return (0.5 * (other.jambs[0] + other.jambs[1]) - middle).norm() < kThickestWall_m;
@@ -168,6 +179,8 @@ void cut_walls_at(const std::vector<WallDoor>& openings, std::vector<WallLine>& 
       // An end in the opening, or a little before it, is at the jamb.
       if (wall.corner[1] < 0 && wall.s1 > s0 - kEnd_m && wall.s1 < s1 && wall.s0 < s0) wall.s1 = s0;
       if (wall.corner[0] < 0 && wall.s0 < s1 + kEnd_m && wall.s0 > s0 && wall.s1 > s1) wall.s0 = s1;
+
+      // The opening replaces those that were found before
       for (auto* parts : {&wall.openings, &wall.gaps}) {
         parts->erase(std::remove_if(parts->begin(), parts->end(),
                                     [&](const WallOpening& part) {

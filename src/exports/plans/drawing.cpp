@@ -10,6 +10,7 @@
 namespace plumbline::exports {
 namespace {
 
+/// Text with the characters escaped that XML gives a meaning.
 std::string escaped(const std::string& text) {
   std::string result;
   for (const char c : text) {
@@ -26,6 +27,7 @@ std::string escaped(const std::string& text) {
   return result;
 }
 
+/// The line's path in millimetres on the sheet.
 std::string svg_path(const DrawnLine& line, const DrawingSheet& sheet) {
   std::string path;
   for (const Eigen::Vector2d& p : line.points) {
@@ -40,6 +42,7 @@ std::string svg_path(const DrawnLine& line, const DrawingSheet& sheet) {
 std::string svg_text(const Drawing& drawing) {
   const DrawingSheet& sheet = drawing.sheet;
 
+  // Sizes are millimetres of paper
   std::string out = fmt::format(
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" "
       "width=\"{0:.2f}mm\" height=\"{1:.2f}mm\" viewBox=\"0 0 {0:.2f} {1:.2f}\">\n"
@@ -49,6 +52,7 @@ std::string svg_text(const Drawing& drawing) {
   for (const std::string& note : drawing.notes) out += "; " + escaped(note);
   out += "</desc>\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n";
 
+  // A group for each layer
   const std::vector<DrawnLine> lines = drawing.all_lines();
   const std::vector<DrawnText> texts = drawing.all_texts();
   for (std::size_t layer = 0; layer < drawing.layers.size(); ++layer) {
@@ -58,6 +62,7 @@ std::string svg_text(const Drawing& drawing) {
         "stroke-linejoin=\"round\">\n",
         l.name, l.color, l.width_mm);
 
+    // Lines come first, so that texts are on top
     for (const DrawnLine& line : lines) {
       if (line.layer != layer) continue;
       out += fmt::format("<path d=\"{}\"{}{}/>\n", svg_path(line, sheet),
@@ -65,10 +70,13 @@ std::string svg_text(const Drawing& drawing) {
                          line.dashed ? " stroke-dasharray=\"2 1.2\"" : "");
     }
 
+    // Texts are centred at their places
     for (const DrawnText& text : texts) {
       if (text.layer != layer) continue;
       const Eigen::Vector2d at = sheet.on_paper(text.at);
       const double height_mm = text.height_m / sheet.mm(), width_mm = text.width_m() / sheet.mm();
+
+      // textLength gives the same width with any font
       out += fmt::format(
           "<text transform=\"translate({:.3f} {:.3f}) rotate({:.2f})\" x=\"{:.3f}\" y=\"{:.3f}\" "
           "font-family=\"Helvetica, Arial, sans-serif\" font-size=\"{:.3f}\" textLength=\"{:.3f}\" "
@@ -86,6 +94,7 @@ core::Result<void> write_svg(const std::filesystem::path& file, const Drawing& d
   return core::write_file(file, svg_text(drawing));
 }
 
+/// A PDF with a page for each drawing; the part "pdf" makes it.
 core::Result<void> write_pdf(const std::filesystem::path& file, const std::vector<Drawing>& pages) {
   const auto& pdf = core::part<PdfFunctions>();
   if (!pdf) return tl::unexpected(pdf.error());

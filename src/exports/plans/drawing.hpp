@@ -157,6 +157,7 @@ struct PdfFunctions {
   core::Result<std::string> (*make)(const std::vector<Page>& pages);
 };
 
+/// Parts on unwanted layers go; the layers stay, so that their numbers hold.
 template <typename Condition>
 void Drawing::remove_layers(const Condition& is_unwanted) {
   const auto clean = [&](auto& things) {

@@ -47,6 +47,7 @@ double DrawnText::width_m() const {
   return width * height_m / kCapital;
 }
 
+/// Corners of the text as it is drawn: read from below or from the right.
 std::vector<Eigen::Vector2d> box_of(const DrawnText& text, double room_m) {
   const double angle = readable_angle(text.angle_rad);
   const Eigen::Vector2d x =
@@ -111,6 +112,7 @@ std::vector<DrawnLine> lines_of(const DrawnDimension& d) {
 }
 
 std::vector<DrawnLine> lines_of(const DrawnSymbol& symbol, const DrawnBlock& block) {
+  // A block is given in a square of one metre
   std::vector<DrawnLine> lines = block.lines;
   for (DrawnLine& line : lines) {
     line.layer = symbol.layer;
@@ -120,6 +122,7 @@ std::vector<DrawnLine> lines_of(const DrawnSymbol& symbol, const DrawnBlock& blo
 }
 
 std::vector<DrawnLine> Drawing::all_lines() const {
+  // All files draw the same lines
   std::vector<DrawnLine> all = lines;
   const auto add = [&](const std::vector<DrawnLine>& more) {
     all.insert(all.end(), more.begin(), more.end());
@@ -145,6 +148,8 @@ std::pair<Eigen::Vector2d, Eigen::Vector2d> Drawing::bounds() const {
       high = high.cwiseMax(p);
     }
   };
+
+  // Lines and texts that the sheet must hold
   for (const DrawnLine& line : all_lines()) add(line.points);
   for (const DrawnText& text : all_texts()) add(box_of(text));
   if (low.x() > high.x()) return {Eigen::Vector2d::Zero(), Eigen::Vector2d::Ones()};

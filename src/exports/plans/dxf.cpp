@@ -11,6 +11,7 @@
 namespace plumbline::exports {
 namespace {
 
+/// Line types of the file; lengths of dashes are in metres of the drawing.
 void put_line_types(DxfText& dxf, double mm) {
   begin_table(dxf, "LTYPE", "5", 4);
   for (const char* name : {"ByBlock", "ByLayer", "Continuous", "DASHED"}) {
@@ -22,6 +23,7 @@ void put_line_types(DxfText& dxf, double mm) {
     dxf.put(73, dashed ? 2 : 0);
     dxf.put(40, dashed ? 3.2 * mm : 0.0);
 
+    // A dash and a gap
     for (const double part : {2.0 * mm, -1.2 * mm}) {
       if (!dashed) continue;
       dxf.put(49, part);
@@ -39,6 +41,7 @@ int line_weight(double width_mm) {
   });
 }
 
+/// The table of layers; layer 0 must exist.
 void put_layers(DxfText& dxf, const Drawing& drawing) {
   begin_table(dxf, "LAYER", "2", static_cast<int>(drawing.layers.size()) + 1);
   const auto put = [&](const DrawingLayer& layer, int weight) {
@@ -61,6 +64,7 @@ double dimension_text(const Drawing& drawing) {
 
 /// A style of dimensions whose measures are lengths on the ground.
 void put_dimension_styles(DxfText& dxf, const Drawing& drawing) {
+  // Heights relative to the texts' height
   const double text_m = dimension_text(drawing);
   begin_table(dxf, "DIMSTYLE", "A", 2);
   dxf.put(100, "AcDbDimStyleTable");
@@ -71,6 +75,7 @@ void put_dimension_styles(DxfText& dxf, const Drawing& drawing) {
                                        std::pair(140, 1.0), std::pair(142, 0.4)})
       dxf.put(code, height * text_m);
 
+    // Measures in metres with three decimals
     dxf.put(144, 1.0 / drawing.unit);
     dxf.put(147, 0.4 * text_m);
     dxf.put(77, 1);
@@ -103,6 +108,7 @@ std::vector<DxfBlock> dxf_blocks(const Drawing& drawing) {
   return blocks;
 }
 
+/// One record for each block, which owns the block's contents.
 void put_block_records(DxfText& dxf, const std::vector<DxfBlock>& blocks) {
   begin_table(dxf, "BLOCK_RECORD", kDxfBlocksTable, static_cast<int>(blocks.size()));
   for (std::size_t i = 0; i < blocks.size(); ++i) {
@@ -113,6 +119,7 @@ void put_block_records(DxfText& dxf, const std::vector<DxfBlock>& blocks) {
   dxf.put(0, "ENDTAB");
 }
 
+/// The beginning that all entities share.
 void begin_entity(DxfText& dxf, const char* type, const std::string& layer, const std::string& owner,
                   bool dashed = false) {
   dxf.put(0, type);
@@ -124,6 +131,7 @@ void begin_entity(DxfText& dxf, const char* type, const std::string& layer, cons
   if (dashed) dxf.put(6, "DASHED");
 }
 
+/// Two points are a LINE, all else is a polyline.
 void put_line(DxfText& dxf, const DrawnLine& line, const std::string& layer, const std::string& owner) {
   if (line.points.size() == 2 && !line.closed) {
     begin_entity(dxf, "LINE", layer, owner, line.dashed);
@@ -133,6 +141,7 @@ void put_line(DxfText& dxf, const DrawnLine& line, const std::string& layer, con
     return;
   }
 
+  // A polyline has a constant width of zero
   begin_entity(dxf, "LWPOLYLINE", layer, owner, line.dashed);
   dxf.put(100, "AcDbPolyline");
   dxf.put(90, static_cast<int>(line.points.size()));
@@ -182,6 +191,7 @@ void put_blocks(DxfText& dxf, const Drawing& drawing, const std::vector<DxfBlock
   dxf.put(0, "ENDSEC");
 }
 
+/// A hatch with its rings, whose lines rise to the right.
 void put_area(DxfText& dxf, const DrawnArea& area, const std::string& layer) {
   begin_entity(dxf, "HATCH", layer, kDxfModelBlock);
   dxf.put(100, "AcDbHatch");
@@ -193,6 +203,7 @@ void put_area(DxfText& dxf, const DrawnArea& area, const std::string& layer) {
   dxf.put(71, 0);
   dxf.put(91, static_cast<int>(area.rings.size()));
 
+  // The outline is an outer ring, all others are holes
   for (std::size_t i = 0; i < area.rings.size(); ++i) {
     dxf.put(92, i == 0 ? 3 : 2);
     dxf.put(72, 0);
@@ -206,6 +217,7 @@ void put_area(DxfText& dxf, const DrawnArea& area, const std::string& layer) {
     dxf.put(97, 0);
   }
 
+  // Lines are as far apart as on the sheet
   dxf.put(75, 0);
   dxf.put(76, 1);
   dxf.put(52, 0.0);
@@ -213,6 +225,7 @@ void put_area(DxfText& dxf, const DrawnArea& area, const std::string& layer) {
   dxf.put(77, 0);
   dxf.put(78, 1);
 
+  // One family of parallel lines at 45 degrees
   const double step = area.spacing_m / std::sqrt(2.0);
   for (const auto& [code, value] : {std::pair(53, 45.0), std::pair(43, 0.0), std::pair(44, 0.0),
                                     std::pair(45, -step), std::pair(46, step)})
@@ -221,6 +234,7 @@ void put_area(DxfText& dxf, const DrawnArea& area, const std::string& layer) {
   dxf.put(98, 0);
 }
 
+/// An insertion of a block, mirrored if its axes turn clockwise.
 void put_symbol(DxfText& dxf, const DrawnSymbol& symbol, const std::string& block, const std::string& layer) {
   const double turn = symbol.x.x() * symbol.y.y() - symbol.x.y() * symbol.y.x();
   begin_entity(dxf, "INSERT", layer, kDxfModelBlock);
@@ -233,6 +247,7 @@ void put_symbol(DxfText& dxf, const DrawnSymbol& symbol, const std::string& bloc
   dxf.put(50, std::atan2(symbol.x.y(), symbol.x.x()) * 180.0 / M_PI);
 }
 
+/// A dimension with its picture as a block, so that all programs show it alike.
 void put_dimension(DxfText& dxf, const DrawnDimension& dimension, std::size_t number,
                    const std::string& layer) {
   begin_entity(dxf, "DIMENSION", layer, kDxfModelBlock);
@@ -248,11 +263,14 @@ void put_dimension(DxfText& dxf, const DrawnDimension& dimension, std::size_t nu
   dxf.put(100, "AcDbAlignedDimension");
   dxf.point(13, dimension.from);
   dxf.point(14, dimension.to);
+
+  // Angle of the dimension line
   const Eigen::Vector2d way = dimension.to - dimension.from;
   dxf.put(50, std::atan2(way.y(), way.x()) * 180.0 / M_PI);
   dxf.put(100, "AcDbRotatedDimension");
 }
 
+/// Everything that the model space holds, areas first, so that lines are drawn over them.
 void put_entities(DxfText& dxf, const Drawing& drawing) {
   const auto layer = [&](const auto& thing) { return drawing.layers[thing.layer].name; };
   dxf.put(0, "SECTION");
@@ -270,6 +288,7 @@ void put_entities(DxfText& dxf, const Drawing& drawing) {
 }  // namespace
 
 core::Result<void> write_dxf(const std::filesystem::path& file, const Drawing& drawing) {
+  // Views and limits need the extent of the drawing
   const auto [low, high] = drawing.bounds();
   const std::vector<DxfBlock> blocks = dxf_blocks(drawing);
   DxfText dxf;
@@ -277,6 +296,7 @@ core::Result<void> write_dxf(const std::filesystem::path& file, const Drawing& d
   dxf.put(2, "TABLES");
   put_viewport(dxf, 0.5 * (low + high), 1.1 * std::max(1.0, (high - low).maxCoeff()));
 
+  // Tables that entities refer to
   put_line_types(dxf, drawing.sheet.mm());
   put_layers(dxf, drawing);
   put_style_tables(dxf);
@@ -284,11 +304,13 @@ core::Result<void> write_dxf(const std::filesystem::path& file, const Drawing& d
   put_block_records(dxf, blocks);
   dxf.put(0, "ENDSEC");
 
+  // Contents of the file
   put_blocks(dxf, drawing, blocks);
   put_entities(dxf, drawing);
   put_objects(dxf);
   dxf.put(0, "EOF");
 
+  // The header holds the next free handle, which is known only now
   core::OutputFile out(file);
   out.write(dxf_header(dxf.next_handle(), drawing, low, high, dimension_text(drawing)));
   out.write(dxf.text());

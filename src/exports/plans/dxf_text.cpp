@@ -4,6 +4,7 @@
 namespace plumbline::exports {
 namespace {
 
+/// A layout, with the plot settings that every program expects.
 void put_layout(DxfText& dxf, const char* handle, const char* name, int order, const char* block) {
   dxf.put(0, "LAYOUT");
   dxf.put(5, handle);
@@ -14,6 +15,7 @@ void put_layout(DxfText& dxf, const char* handle, const char* name, int order, c
   dxf.put(4, "");
   dxf.put(6, "");
 
+  // Margins and sizes of the paper: none
   for (int code = 40; code <= 49; ++code) dxf.put(code, 0.0);
   dxf.put(140, 0.0);
   dxf.put(141, 0.0);
@@ -30,6 +32,7 @@ void put_layout(DxfText& dxf, const char* handle, const char* name, int order, c
   dxf.put(148, 0.0);
   dxf.put(149, 0.0);
 
+  // Limits and axes of the layout
   dxf.put(100, "AcDbLayout");
   dxf.put(1, name);
   dxf.put(70, 1);
@@ -50,6 +53,7 @@ void put_layout(DxfText& dxf, const char* handle, const char* name, int order, c
   dxf.put(330, block);
 }
 
+/// A dictionary of objects, whose entries are name and handle.
 void put_dictionary(DxfText& dxf, const char* handle, const char* owner,
                     const std::vector<std::pair<const char*, const char*>>& entries) {
   dxf.put(0, "DICTIONARY");
@@ -65,6 +69,7 @@ void put_dictionary(DxfText& dxf, const char* handle, const char* owner,
 
 }  // namespace
 
+/// Text whose characters beyond ASCII are \U+XXXX, as R2000 reads them.
 std::string DxfText::encoded(const std::string& utf8) {
   std::string out;
   for (std::size_t i = 0; i < utf8.size(); ++i) {
@@ -73,6 +78,8 @@ std::string DxfText::encoded(const std::string& utf8) {
       out += utf8[i];
       continue;
     }
+
+    // Length and first bits of a character in UTF-8
     const std::size_t more = c >= 0xF0 ? 3 : c >= 0xE0 ? 2 : 1;
     unsigned code = c & (0x3FU >> more);
     for (std::size_t k = 1; k <= more && i + k < utf8.size(); ++k)
@@ -83,6 +90,7 @@ std::string DxfText::encoded(const std::string& utf8) {
   return out;
 }
 
+/// The beginning of a table with this number of entries.
 void begin_table(DxfText& dxf, const char* name, const char* handle, int entries) {
   dxf.put(0, "TABLE");
   dxf.put(2, name);
@@ -92,6 +100,7 @@ void begin_table(DxfText& dxf, const char* name, const char* handle, int entries
   dxf.put(70, entries);
 }
 
+/// The beginning of an entry; without a handle it gets the next one.
 void begin_entry(DxfText& dxf, const char* type, const char* handle, const char* table, const char* marker,
                  const std::string& name) {
   dxf.put(0, type);
@@ -107,6 +116,7 @@ void begin_entry(DxfText& dxf, const char* type, const char* handle, const char*
 }
 
 void put_viewport(DxfText& dxf, const Eigen::Vector2d& middle, double height) {
+  // The view that a program shows first
   begin_table(dxf, "VPORT", "8", 1);
   begin_entry(dxf, "VPORT", nullptr, "8", "AcDbViewportTableRecord", "*ACTIVE");
   dxf.put(70, 0);
@@ -115,6 +125,7 @@ void put_viewport(DxfText& dxf, const Eigen::Vector2d& middle, double height) {
     dxf.put(code + 10, y);
   };
 
+  // Corners, middle, snap and grid
   pair(10, 0.0, 0.0);
   pair(11, 1.0, 1.0);
   pair(12, middle.x(), middle.y());
@@ -122,6 +133,7 @@ void put_viewport(DxfText& dxf, const Eigen::Vector2d& middle, double height) {
   pair(14, 0.1, 0.1);
   pair(15, 1.0, 1.0);
 
+  // Direction, height and lens of the view
   dxf.put(16, 0.0);
   dxf.put(26, 0.0);
   dxf.put(36, 1.0);
@@ -133,6 +145,7 @@ void put_viewport(DxfText& dxf, const Eigen::Vector2d& middle, double height) {
 }
 
 void put_style_tables(DxfText& dxf) {
+  // The only style of texts
   begin_table(dxf, "STYLE", "3", 1);
   begin_entry(dxf, "STYLE", "11", "3", "AcDbTextStyleTableRecord", "Standard");
   dxf.put(70, 0);
@@ -148,6 +161,7 @@ void put_style_tables(DxfText& dxf) {
   begin_table(dxf, "VIEW", "6", 0);
   dxf.put(0, "ENDTAB");
 
+  // User coordinate systems: none, applications: AutoCAD's own
   begin_table(dxf, "UCS", "7", 0);
   dxf.put(0, "ENDTAB");
   begin_table(dxf, "APPID", "9", 1);
@@ -157,6 +171,7 @@ void put_style_tables(DxfText& dxf) {
 }
 
 void put_objects(DxfText& dxf) {
+  // Names of everything below the root
   dxf.put(0, "SECTION");
   dxf.put(2, "OBJECTS");
   put_dictionary(dxf, kDxfRootDictionary, "0",
@@ -168,9 +183,12 @@ void put_objects(DxfText& dxf) {
   put_dictionary(dxf, "D", kDxfRootDictionary, {});
   put_dictionary(dxf, "1A", kDxfRootDictionary, {{"Model", "22"}, {"Layout1", "1E"}});
 
+  // Layouts of model and paper
   put_layout(dxf, "22", "Model", 0, kDxfModelBlock);
   put_layout(dxf, "1E", "Layout1", 1, kDxfPaperBlock);
   put_dictionary(dxf, "17", kDxfRootDictionary, {{"Standard", "18"}});
+
+  // The style of multilines that must exist
   dxf.put(0, "MLINESTYLE");
   dxf.put(5, "18");
   dxf.put(330, "17");
@@ -184,12 +202,14 @@ void put_objects(DxfText& dxf) {
   dxf.put(52, 90.0);
   dxf.put(71, 2);
 
+  // Both lines of that style
   for (const double offset : {0.5, -0.5}) {
     dxf.put(49, offset);
     dxf.put(62, 256);
     dxf.put(6, "BYLAYER");
   }
 
+  // Plot styles, of which there is only the normal one
   put_dictionary(dxf, "19", kDxfRootDictionary, {});
   dxf.put(0, "ACDBDICTIONARYWDFLT");
   dxf.put(5, "E");

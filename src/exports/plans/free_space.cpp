@@ -27,6 +27,7 @@ void FreeSpace::add(const ViewRays& rays) {
   constexpr double kHigh_m = 2.4;
   ++view_;
 
+  // Cells up to a little before the surface
   cameras_.emplace_back(rays.origin.head<2>());
   for (const Eigen::Vector3f& end : rays.ends) {
     const Eigen::Vector3d way = end.cast<double>() - rays.origin;
@@ -37,6 +38,8 @@ void FreeSpace::add(const ViewRays& rays) {
       const int cell = index(at.head<2>());
       if (cell < 0 || height < kLow_m || height > kHigh_m || last_[static_cast<std::size_t>(cell)] == view_)
         continue;
+
+      // A view counts once for each cell
       last_[static_cast<std::size_t>(cell)] = view_;
       auto& count = views_[static_cast<std::size_t>(cell)];
       count = static_cast<std::uint16_t>(std::min(60000, count + 1));
@@ -45,6 +48,7 @@ void FreeSpace::add(const ViewRays& rays) {
 }
 
 double FreeSpace::share(const std::vector<Eigen::Vector2d>& outline) const {
+  // Box of the cells that the outline may hold
   Eigen::AlignedBox2d around;
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
   for (const Eigen::Vector2d& p : outline) {
@@ -52,6 +56,7 @@ double FreeSpace::share(const std::vector<Eigen::Vector2d>& outline) const {
     middle += p / static_cast<double>(outline.size());
   }
 
+  // Convex and counter-clockwise: inside is left of all sides
   const auto holds = [&](const Eigen::Vector2d& p) {
     for (std::size_t i = 0; i < outline.size(); ++i) {
       const Eigen::Vector2d side = outline[(i + 1) % outline.size()] - outline[i];
@@ -62,6 +67,7 @@ double FreeSpace::share(const std::vector<Eigen::Vector2d>& outline) const {
     return true;
   };
 
+  // Cells whose middle is inside
   const auto number = [&](const Eigen::Vector2d& p, int axis) {
     return static_cast<int>(std::floor((p[axis] - box_.min()[axis]) / kCell_m));
   };

@@ -15,11 +15,13 @@
 
 namespace plumbline::exports {
 
+/// The place at which most values are, refined by medians; nothing if there are too few.
 std::optional<double> main_place(const std::vector<double>& places) {
   constexpr double kBin_m = 0.002;
   constexpr double kNear_m = 0.008;
   constexpr std::size_t kFewest = 25;
 
+  // The interval that holds most values
   if (places.size() < kFewest) return std::nullopt;
   const double first = *std::min_element(places.begin(), places.end());
   const double last = *std::max_element(places.begin(), places.end());
@@ -34,6 +36,7 @@ std::optional<double> main_place(const std::vector<double>& places) {
     best = at;
   }
 
+  // Medians of the values near it withstand outliers
   for (int round = 0; round < 3; ++round) {
     std::vector<double> near;
     std::copy_if(places.begin(), places.end(), std::back_inserter(near),
@@ -45,11 +48,14 @@ std::optional<double> main_place(const std::vector<double>& places) {
   return best;
 }
 
+/// Points near an opening: along it, in front of it, and over the floor.
 NearPoints points_near(const cloud::Cloud& cloud, double floor_m, const WallDoor& door, double reach_m) {
   NearPoints points;
   const Eigen::Vector2d along = (door.jambs[1] - door.jambs[0]).normalized();
   const Eigen::Vector2d front(along.y(), -along.x());
   const double depth = std::max(0.1, (door.far_jambs[0] - door.jambs[0]).norm());
+
+  // Coordinates along and in front of the near jamb
   for (const cloud::Point& p : cloud) {
     const Eigen::Vector2d way = p.getVector3fMap().head<2>().cast<double>() - door.jambs[0];
     const double s = along.dot(way), h = front.dot(way);
@@ -115,6 +121,7 @@ void measure_head(const NearPoints& points, WallDoor& door) {
 
 }  // namespace
 
+/// Measures clear width and head of doors; wide or high ones are passages.
 void measure_doors(const cloud::Cloud& cloud, double floor_m, std::vector<WallDoor>& doors) {
   constexpr double kWidestLeaf_m = 1.3;
   for (WallDoor& door : doors) {
@@ -125,15 +132,19 @@ void measure_doors(const cloud::Cloud& cloud, double floor_m, std::vector<WallDo
   }
 }
 
+/// Heights of the rooms' ceilings: median, and range of the middle nine tenths.
 void measure_heights(const cloud::Cloud& cloud, double floor_m, std::vector<WallRoom>& rooms) {
   constexpr double kLowest_m = 1.9;
   constexpr double kFewestPerArea = 300.0;  // per square metre: a tenth of a ceiling
   std::vector<std::vector<double>> heights(rooms.size());
 
+  // Points that face down, by room
   for (const cloud::Point& p : cloud) {
     const double height = static_cast<double>(p.z) - floor_m;
     if (!(p.normal_z < -0.9F) || height < kLowest_m) continue;
     const Eigen::Vector2d at = p.getVector3fMap().head<2>().cast<double>();
+
+    // Rooms do not overlap
     for (std::size_t i = 0; i < rooms.size(); ++i) {
       if (!is_inside(rooms[i].outline, at)) continue;
       heights[i].push_back(height);
@@ -141,6 +152,7 @@ void measure_heights(const cloud::Cloud& cloud, double floor_m, std::vector<Wall
     }
   }
 
+  // A ceiling of which little was seen is not measured
   for (std::size_t i = 0; i < rooms.size(); ++i) {
     std::vector<double>& of_room = heights[i];
     if (static_cast<double>(of_room.size()) < kFewestPerArea * rooms[i].area_m2) continue;
@@ -150,6 +162,7 @@ void measure_heights(const cloud::Cloud& cloud, double floor_m, std::vector<Wall
   }
 }
 
+/// Outlines of all that stands at the height of furniture and away from walls.
 std::vector<std::vector<Eigen::Vector2d>> furniture_outlines(const cloud::Cloud& cloud, double floor_m,
                                                              const std::vector<WallLine>& walls) {
   constexpr double kCell_m = 0.03;
@@ -158,6 +171,7 @@ std::vector<std::vector<Eigen::Vector2d>> furniture_outlines(const cloud::Cloud&
   constexpr double kSmallest_m2 = 0.03;
   constexpr double kLargest_m = 500.0;
 
+  // Points between floor and head height
   std::vector<Eigen::Vector2d> places;
   Eigen::AlignedBox2d box;
   for (const cloud::Point& p : cloud) {
@@ -165,6 +179,8 @@ std::vector<std::vector<Eigen::Vector2d>> furniture_outlines(const cloud::Cloud&
     const Eigen::Vector2d at = p.getVector3fMap().head<2>().cast<double>();
 
     if (height < kLow_m || height > kHigh_m) continue;
+
+    // Points on a wall are no furniture
     const bool at_wall = std::any_of(walls.begin(), walls.end(), [&](const WallLine& wall) {
       const double s = wall.along().dot(at);
       return std::abs(wall.normal.dot(at) - wall.offset_m) < kAtWall_m && s > wall.s0 - kAtWall_m &&
@@ -178,6 +194,7 @@ std::vector<std::vector<Eigen::Vector2d>> furniture_outlines(const cloud::Cloud&
 
   if (places.empty() || box.sizes().maxCoeff() > kLargest_m) return {};
 
+  // A raster of cells with points
   const Eigen::Vector2d low = box.min().array() - 3.0 * kCell_m;
   const Eigen::Array2i size = ((box.max() - low) / kCell_m).array().ceil().cast<int>() + 3;
   cv::Mat cells = cv::Mat::zeros(size.y(), size.x(), CV_8U);
@@ -188,6 +205,7 @@ std::vector<std::vector<Eigen::Vector2d>> furniture_outlines(const cloud::Cloud&
   }
   cv::morphologyEx(cells, cells, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_RECT, {3, 3}));
 
+  // Outer contours, simplified to the size of a cell
   std::vector<std::vector<cv::Point>> contours;
   cv::findContours(cells, contours, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
   std::vector<std::vector<Eigen::Vector2d>> outlines;

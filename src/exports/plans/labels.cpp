@@ -46,6 +46,7 @@ void LabelPlaces::add(const DrawnLine& line) {
 
 void LabelPlaces::add(const DrawnText& text) { texts_.push_back(box_of(text, kLabelRoom * text.height_m)); }
 
+/// True if the text's box is apart from all texts and lines.
 bool LabelPlaces::is_free(const DrawnText& text) const {
   const auto box = box_of(text, kLabelRoom * text.height_m);
   return std::none_of(texts_.begin(), texts_.end(),
@@ -59,6 +60,7 @@ bool LabelPlaces::is_free(const Eigen::Vector2d& a, const Eigen::Vector2d& b) co
   return std::none_of(texts_.begin(), texts_.end(), [&](const auto& box) { return !is_apart(box, {a, b}); });
 }
 
+/// Puts the text at the first free place, which is taken from then on.
 bool LabelPlaces::place(DrawnText& text, const std::vector<Eigen::Vector2d>& places) {
   for (const Eigen::Vector2d& at : places) {
     text.at = at;
@@ -69,6 +71,7 @@ bool LabelPlaces::place(DrawnText& text, const std::vector<Eigen::Vector2d>& pla
   return false;
 }
 
+/// Places of a grid around the middle, the nearest first.
 std::vector<Eigen::Vector2d> places_around(const Eigen::Vector2d& middle, double step, double farthest) {
   const int count = static_cast<int>(farthest / step);
   std::vector<Eigen::Vector2d> places;

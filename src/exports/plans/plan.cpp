@@ -12,6 +12,7 @@
 namespace plumbline::exports {
 namespace {
 
+/// Writes the plan as numbers.
 core::Result<ExportSummary> write_plan_json(MapSource& source, const std::filesystem::path& output) {
   if (!source.options().section.empty())
     return core::usage_error("--section: is a drawing; write .svg, .pdf or .dxf");
@@ -46,6 +47,7 @@ core::Result<void> write_pages(const std::vector<Drawing>& pages, const std::fil
   return {};
 }
 
+/// Writes a plan or a section; only plans that are drawn can be in world coordinates.
 core::Result<ExportSummary> write_plan(MapSource& source, const std::filesystem::path& output) {
   const auto world = georeference_of(source.options(), source.log());
   if (!world) return tl::unexpected(world.error());
@@ -57,6 +59,7 @@ core::Result<ExportSummary> write_plan(MapSource& source, const std::filesystem:
                     output.string()));
   }
 
+  // JSON has no sheets; a drawing has one for each storey
   if (json) return write_plan_json(source, output);
   ExportSummary summary;
   core::Result<std::vector<Drawing>> pages;
@@ -68,10 +71,13 @@ core::Result<ExportSummary> write_plan(MapSource& source, const std::filesystem:
     pages = plan_sheets(source, *world, summary);
   }
 
+  // The georeference is a file next to the drawing
   if (!pages) return tl::unexpected(pages.error());
   auto written = write_pages(*pages, output, summary);
   if (written && *world) written = write_georeference(output, **world);
   if (!written) return tl::unexpected(written.error());
+
+  // Scale and paper of the first page stand for all
   const DrawingSheet& sheet = pages->front().sheet;
   summary.notes.push_back(fmt::format("1:{} on {}{}", sheet.scale, sheet.paper,
                                       pages->size() > 1 ? fmt::format(", {} sheets", pages->size()) : ""));
@@ -80,6 +86,7 @@ core::Result<ExportSummary> write_plan(MapSource& source, const std::filesystem:
 
 }  // namespace
 
+/// Counts of walls, doors and rooms, and what could not be known.
 std::vector<std::string> notes_of(const WallPlan& plan) {
   std::size_t gaps = 0;
   const auto doors = std::count_if(plan.doors.begin(), plan.doors.end(),
@@ -98,12 +105,14 @@ std::vector<std::string> notes_of(const WallPlan& plan) {
   return notes;
 }
 
+/// Parts of the wall between openings and gaps.
 std::vector<std::pair<double, double>> solid_pieces(const WallLine& wall) {
   std::vector<WallOpening> openings = wall.openings;
   openings.insert(openings.end(), wall.gaps.begin(), wall.gaps.end());
   std::sort(openings.begin(), openings.end(),
             [](const WallOpening& a, const WallOpening& b) { return a.s0 < b.s0; });
 
+  // Openings may overlap
   std::vector<std::pair<double, double>> pieces;
   double from = wall.s0;
   for (const WallOpening& opening : openings) {

@@ -96,10 +96,13 @@ std::string PlanStyle::number(double value, int decimals) const {
   return text;
 }
 
+/// Walls with hatching, furniture, openings and the limits of rooms.
 void draw_walls(const WallPlan& plan, const PlanStyle& style, const PlanLayers& layers, Drawing& drawing) {
   for (const auto& outline : plan.furniture) {
     if (!is_behind_walls(outline, plan)) drawing.lines.push_back({layers.furniture, outline, true});
   }
+
+  // Solids: outlined, hatched if both faces were seen
   for (WallSolid& solid : wall_solids(plan, style.unit)) {
     for (const auto& ring : solid.rings)
       drawing.lines.push_back(
@@ -107,6 +110,7 @@ void draw_walls(const WallPlan& plan, const PlanStyle& style, const PlanLayers& 
     if (!solid.assumed) drawing.areas.push_back({layers.hatch, std::move(solid.rings), 1.2 * style.mm});
   }
 
+  // Faces, and gaps that are no windows
   for (const WallLine& wall : plan.walls) {
     for (const auto& [a, b] : solid_pieces(wall)) drawing.line(layers.wall, wall.at(a), wall.at(b));
 
@@ -120,6 +124,7 @@ void draw_walls(const WallPlan& plan, const PlanStyle& style, const PlanLayers& 
     }
   }
 
+  // Openings, and sides of rooms without a wall
   for (const WallDoor& door : plan.doors) draw_opening(door, layers, style.unit, drawing);
   for (const WallRoom& room : plan.rooms) {
     for (std::size_t i = 0; i < room.outline.size(); ++i) {
@@ -129,6 +134,7 @@ void draw_walls(const WallPlan& plan, const PlanStyle& style, const PlanLayers& 
   }
 }
 
+/// Numbers of openings by kind: D1, P1, W1.
 std::vector<std::string> opening_numbers(const WallPlan& plan) {
   std::array<int, 3> counts{0, 0, 0};
   std::vector<std::string> numbers;
@@ -189,11 +195,13 @@ void draw_labels(const WallPlan& plan, const PlanStyle& style, const PlanLayers&
   }
 }
 
+/// Tables of rooms and openings, without empty ones.
 std::vector<SheetTable> tables_of(const WallPlan& plan, const PlanStyle& style) {
   const auto known = [&](double value) { return value > 0.0 ? style.number(value, 2) : std::string("–"); };
   std::vector<SheetTable> tables(2);
   tables[0] = {"Rooms", {{"No.", 9}, {"Area (m²)", 21}, {"Perimeter (m)", 23}, {"Height (m)", 34}}, {}};
 
+  // Areas of rooms seen in part are lower bounds
   for (std::size_t i = 0; i < plan.rooms.size(); ++i) {
     const WallRoom& room = plan.rooms[i];
 
@@ -207,6 +215,7 @@ std::vector<SheetTable> tables_of(const WallPlan& plan, const PlanStyle& style) 
                               known(room.height_m) + range});
   }
 
+  // Openings in the order of their numbers
   static constexpr std::array<const char*, 3> kKinds{"door", "passage", "window"};
   const std::vector<std::string> numbers = opening_numbers(plan);
   tables[1] = {"Openings",
@@ -218,6 +227,7 @@ std::vector<SheetTable> tables_of(const WallPlan& plan, const PlanStyle& style) 
                               style.number(door.width_m, 3), known(door.sill_m), known(door.head_m)});
   }
 
+  // A table without rows is left out
   tables.erase(
       std::remove_if(tables.begin(), tables.end(), [](const SheetTable& t) { return t.rows.empty(); }),
       tables.end());

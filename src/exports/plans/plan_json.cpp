@@ -16,6 +16,7 @@ double to_tenth_mm(double value) { return std::round(value * 1e4) / 1e4; }
 PlanJson place(const Eigen::Vector2d& p) { return {to_tenth_mm(p.x()), to_tenth_mm(p.y())}; }
 PlanJson known(double value) { return value > 0.0 ? PlanJson(to_tenth_mm(value)) : PlanJson(nullptr); }
 
+/// A room with what is along each of its sides.
 PlanJson room_json(const WallRoom& room, std::size_t number) {
   static constexpr std::array<const char*, 3> kSides{"wall", "gap", "limit"};
   PlanJson outline = PlanJson::array(), sides = PlanJson::array();
@@ -24,6 +25,7 @@ PlanJson room_json(const WallRoom& room, std::size_t number) {
     sides.push_back(kSides[static_cast<std::size_t>(room.side(i))]);
   }
 
+  // Values that are not known are null
   PlanJson json = {{"number", number},
                    {"closed", room.closed},
                    {"area_m2", to_tenth_mm(room.area_m2)},
@@ -34,6 +36,7 @@ PlanJson room_json(const WallRoom& room, std::size_t number) {
                    {"outline_m", outline},
                    {"sides", sides}};
 
+  // Ceilings that are not level have a range
   if (room.height_m > 0.0)
     json["heights_m"] = {to_tenth_mm(room.heights_m[0]), to_tenth_mm(room.heights_m[1])};
   return json;
@@ -41,12 +44,14 @@ PlanJson room_json(const WallRoom& room, std::size_t number) {
 
 }  // namespace
 
+/// The plan as JSON; lengths are metres, rounded to a tenth of a millimetre.
 std::string plan_json(const WallPlan& plan, const std::string& frame, double floor_m, double cut_m) {
   PlanJson json = {{"frame", frame}, {"unit", "m"}, {"floor_m", floor_m}, {"cut_m", cut_m}};
   json["rooms"] = PlanJson::array();
   for (std::size_t i = 0; i < plan.rooms.size(); ++i)
     json["rooms"].push_back(room_json(plan.rooms[i], i + 1));
 
+  // Numbers as in the drawing
   json["openings"] = PlanJson::array();
   const std::vector<std::string> numbers = opening_numbers(plan);
 
@@ -69,6 +74,7 @@ std::string plan_json(const WallPlan& plan, const std::string& frame, double flo
          {"opens", door.hinge < 0 ? PlanJson(nullptr) : PlanJson(door.opens_front ? "right" : "left")}});
   }
 
+  // Walls without their openings
   json["walls"] = PlanJson::array();
   for (const WallLine& wall : plan.walls) {
     for (const auto& [a, b] : solid_pieces(wall)) {
@@ -79,6 +85,7 @@ std::string plan_json(const WallPlan& plan, const std::string& frame, double flo
     }
   }
 
+  // Outlines of furniture
   json["furniture"] = PlanJson::array();
   for (const auto& outline : plan.furniture) {
     PlanJson corners = PlanJson::array();

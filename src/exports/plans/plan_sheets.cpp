@@ -74,6 +74,7 @@ core::Result<std::set<std::string>> layers_without(const std::string& list, cons
   return out;
 }
 
+/// The scale's denominator; 0: it is chosen to fit the sheet.
 core::Result<int> scale_of(const std::string& text) {
   const std::string number = text.rfind("1:", 0) == 0 ? text.substr(2) : text;
   const bool digits = !number.empty() && number.size() < 6 &&
@@ -87,6 +88,7 @@ core::Result<int> scale_of(const std::string& text) {
 /// The plan of one storey.
 core::Result<Drawing> storey_sheet(MapSource& source, const std::string& storey,
                                    const std::optional<Georeference>& world, ExportSummary& summary) {
+  // Walls are found in the map's frame, then moved
   auto found = find_walls(source);
   if (!found) return tl::unexpected(found.error());
   const WallPlan plan =
@@ -95,6 +97,7 @@ core::Result<Drawing> storey_sheet(MapSource& source, const std::string& storey,
   for (const std::string& note : notes)
     summary.notes.push_back(storey.empty() ? note : "storey " + storey + ": " + note);
 
+  // The title block tells storey, height of the cut and coordinates
   SheetFacts facts;
   facts.georeferenced = world.has_value();
   const std::string frame =
@@ -108,6 +111,7 @@ core::Result<Drawing> storey_sheet(MapSource& source, const std::string& storey,
       !told)
     return tl::unexpected(told.error());
 
+  // Content is drawn again for every scale that is tried
   const double unit = world ? world->scale : 1.0;
   return sheet_of(source.options(), facts, plan, unit,
                   [&](const PlanStyle& style, const PlanLayers& layers, Drawing& drawing) {
@@ -127,10 +131,12 @@ core::Result<Drawing> storey_sheet(MapSource& source, const std::string& storey,
 
 }  // namespace
 
+/// Facts for the title block: options first, then the file of --title-block.
 core::Result<void> add_facts(const MapSource& source, const TitleRows& rows, SheetFacts& facts) {
   const ExportOptions& o = source.options();
   TitleRows told{{"Title", o.title}, {"Client", o.client}, {"Address", o.address}, {"Recorded", o.date}};
 
+  // The file may add rows of its own
   if (!o.title_block.empty()) {
     const auto file = core::read_yaml(o.title_block);
     if (!file) return tl::unexpected(file.error());
@@ -146,6 +152,7 @@ core::Result<void> add_facts(const MapSource& source, const TitleRows& rows, She
     }
   }
 
+  // Facts that nobody gave
   facts.title = told.front().second.empty() ? source.name() : told.front().second;
   if (told[3].second.empty()) told[3].second = recorded_on(source);
   for (auto& row : told) row = {core::printable(row.first), core::printable(row.second)};
@@ -155,6 +162,7 @@ core::Result<void> add_facts(const MapSource& source, const TitleRows& rows, She
   return {};
 }
 
+/// The first sheet, from the largest scale on, that holds the drawing with all its tables.
 core::Result<Drawing> sheet_of(const ExportOptions& options, const SheetFacts& facts, const WallPlan& plan,
                                double unit, const DrawContent& draw) {
   const auto scale = scale_of(options.scale);
@@ -162,6 +170,7 @@ core::Result<Drawing> sheet_of(const ExportOptions& options, const SheetFacts& f
   const SheetOptions wanted{options.paper == "auto" ? "" : options.paper, *scale};
   Eigen::Vector2d size = Eigen::Vector2d::Zero();
 
+  // Sizes of texts depend on the scale
   for (const int of : sheet_scales(wanted)) {
     Drawing drawing;
     drawing.sheet.scale = of;
@@ -172,6 +181,7 @@ core::Result<Drawing> sheet_of(const ExportOptions& options, const SheetFacts& f
     const auto without = layers_without(options.without, drawing);
     if (!without) return tl::unexpected(without.error());
 
+    // Layers are removed by words of their names
     const auto is_unwanted = [&](const DrawingLayer& layer) {
       const std::set<std::string> words = layer_words(layer);
       return std::any_of(words.begin(), words.end(),
@@ -180,6 +190,7 @@ core::Result<Drawing> sheet_of(const ExportOptions& options, const SheetFacts& f
     draw(style, layers, drawing);
     drawing.remove_layers(is_unwanted);
 
+    // The sheet adds lines and texts on the same layers
     const auto [low, high] = drawing.bounds();
     size = high - low;
     if (!put_on_sheet(wanted, facts, style, layers, tables_of(plan, style), drawing)) continue;
@@ -188,17 +199,20 @@ core::Result<Drawing> sheet_of(const ExportOptions& options, const SheetFacts& f
     return drawing;
   }
 
+  // No scale fits on the paper
   return core::usage_error(fmt::format(
       "--scale {}: what is drawn has {:.1f} x {:.1f} m, which {} does not hold beside its tables; "
       "leave --scale or --paper out",
       options.scale, size.x(), size.y(), wanted.paper.empty() ? "A0" : wanted.paper));
 }
 
+/// The plan as a part of a page, at the largest scale that fits.
 PlanPage plan_page(const WallPlan& plan, const std::string& name) {
   constexpr double kWidest_mm = 182.0, kTallest_mm = 150.0, kAround_mm = 3.0;
   PlanPage page;
   Drawing drawing;
 
+  // The drawing alone decides on the scale
   for (const int scale : sheet_scales({})) {
     drawing = {};
     drawing.title = name;
@@ -209,6 +223,7 @@ PlanPage plan_page(const WallPlan& plan, const std::string& name) {
     draw_dimensions(plan, {mm}, layers, drawing);
     draw_labels(plan, {mm}, layers, drawing);
 
+    // The page is as large as the drawing
     const auto [low, high] = drawing.bounds();
     drawing.sheet.low = low.array() - kAround_mm * mm;
     drawing.sheet.width_mm = (high.x() - low.x()) / mm + 2.0 * kAround_mm;
@@ -216,6 +231,7 @@ PlanPage plan_page(const WallPlan& plan, const std::string& name) {
     if (drawing.sheet.width_mm <= kWidest_mm && drawing.sheet.height_mm <= kTallest_mm) break;
   }
 
+  // Tables are the page's, not the drawing's
   drawing.break_lines();
   page.svg = svg_text(drawing);
   for (SheetTable& table : tables_of(plan, {})) {

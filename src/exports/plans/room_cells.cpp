@@ -50,6 +50,7 @@ bool cuts(const CuttingLine& line, const PlanOutline& outline) {
          std::min(s1, line.length) - std::max(s0, 0.0) > 0.01;
 }
 
+/// Splits the cells that a line passes through.
 void cut_cells(const CuttingLine& line, std::vector<PlanOutline>& cells) {
   const std::size_t count = cells.size();
   for (std::size_t i = 0; i < count; ++i) {
@@ -69,11 +70,13 @@ std::vector<CuttingLine> cutting_lines(const std::vector<WallLine>& walls,
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const WallLine& a, const WallLine& b) { return a.length() > b.length(); });
 
+  // Walls are extended, for corners may be hidden
   for (const WallLine& wall : sorted) {
     const double beyond_m = wall.length() < kShort_m ? 0.3 : std::min(kBeyond_m, 0.3 + 1.5 * wall.length());
     lines.push_back({wall.at(wall.s0 - beyond_m), wall.along(), wall.length() + 2.0 * beyond_m});
   }
 
+  // Sides of openings separate them from rooms
   for (const PlanOutline& opening : openings) {
     for (std::size_t i = 0; i < opening.size(); ++i) {
       const Eigen::Vector2d side = opening[(i + 1) % opening.size()] - opening[i];
@@ -93,6 +96,7 @@ void refine_cells(const FreeSpace& space, std::vector<PlanOutline>& cells) {
     Eigen::Vector2d along = Eigen::Vector2d::UnitX();
     double longest = 0.0;
 
+    // The direction of the longest side
     for (std::size_t k = 0; k < cell.size(); ++k) {
       const Eigen::Vector2d side = cell[(k + 1) % cell.size()] - cell[k];
       if (side.norm() <= longest) continue;
@@ -107,10 +111,13 @@ void refine_cells(const FreeSpace& space, std::vector<PlanOutline>& cells) {
     }
     const double free = s1 - s0 > kLongest_m ? space.share(cell) : 0.0;
 
+    // Cells that are clearly free, or clearly not, stay whole
     if (free < kLeast || free > 1.0 - kLeast) {
       ++i;
       continue;
     }
+
+    // Cut across the middle
     const Eigen::Vector2d middle = 0.5 * (s0 + s1) * along;
     const Eigen::Vector2d across(-along.y(), along.x());
     PlanOutline rest = left_of(cell, middle, -across);
@@ -135,6 +142,7 @@ double area_of(const PlanOutline& outline) {
   return 0.5 * twice;
 }
 
+/// True if a ray from the place crosses the outline an odd number of times.
 bool is_inside(const PlanOutline& outline, const Eigen::Vector2d& place) {
   bool in = false;
   for (std::size_t i = 0; i < outline.size(); ++i) {
@@ -146,6 +154,7 @@ bool is_inside(const PlanOutline& outline, const Eigen::Vector2d& place) {
   return in;
 }
 
+/// Outlines of openings through the thickness of the wall, counter-clockwise.
 std::vector<PlanOutline> openings_of(const std::vector<WallDoor>& doors) {
   constexpr double kAssumed_m = 0.1;  // depth of an opening of which one side was seen
   std::vector<PlanOutline> openings;
@@ -162,6 +171,7 @@ std::vector<PlanOutline> openings_of(const std::vector<WallDoor>& doors) {
   return openings;
 }
 
+/// Cells that the walls' lines cut the plan into, with their shares of free space.
 std::vector<RoomCell> cells_of(const Eigen::AlignedBox2d& box, const std::vector<WallLine>& walls,
                                const std::vector<PlanOutline>& openings, const FreeSpace& space) {
   std::vector<PlanOutline> outlines{
@@ -169,6 +179,7 @@ std::vector<RoomCell> cells_of(const Eigen::AlignedBox2d& box, const std::vector
   for (const CuttingLine& line : cutting_lines(walls, openings)) cut_cells(line, outlines);
   refine_cells(space, outlines);
 
+  // Facts that later decide on inside and outside
   std::vector<RoomCell> cells;
   for (PlanOutline& outline : outlines) {
     const Eigen::Vector2d middle = middle_of(outline);
@@ -185,14 +196,18 @@ std::vector<RoomCell> cells_of(const Eigen::AlignedBox2d& box, const std::vector
   return cells;
 }
 
+/// Common borders of neighbouring cells.
 std::vector<CellBorder> borders_of(const std::vector<RoomCell>& cells) {
   constexpr double kSame_m = 1e-6;
+
+  // Boxes exclude most pairs
   std::vector<Eigen::AlignedBox2d> boxes(cells.size());
   for (std::size_t i = 0; i < cells.size(); ++i) {
     for (const Eigen::Vector2d& p : cells[i].outline) boxes[i].extend(p);
     boxes[i] = {boxes[i].min().array() - kSame_m, boxes[i].max().array() + kSame_m};
   }
 
+  // Sides of neighbours run in opposite directions
   std::vector<CellBorder> borders;
   const auto add_common = [&](std::size_t a, std::size_t b) {
     const PlanOutline& of_a = cells[a].outline;
@@ -202,6 +217,8 @@ std::vector<CellBorder> borders_of(const std::vector<RoomCell>& cells) {
       const double length = side.norm();
       if (length < kSame_m) continue;
       const Eigen::Vector2d along = side / length;
+
+      // Sides of the other cell on the same line
       for (std::size_t j = 0; j < of_b.size(); ++j) {
         const Eigen::Vector2d p = of_b[(j + 1) % of_b.size()] - of_a[i];  // the other cell goes backwards
         const Eigen::Vector2d q = of_b[j] - of_a[i];
@@ -212,6 +229,7 @@ std::vector<CellBorder> borders_of(const std::vector<RoomCell>& cells) {
     }
   };
 
+  // All pairs whose boxes meet
   for (std::size_t a = 0; a < cells.size(); ++a) {
     for (std::size_t b = a + 1; b < cells.size(); ++b) {
       if (boxes[a].intersects(boxes[b])) add_common(a, b);
@@ -221,12 +239,15 @@ std::vector<CellBorder> borders_of(const std::vector<RoomCell>& cells) {
   return borders;
 }
 
+/// Parts of a segment that walls or openings run along, as shares of it.
 std::vector<WallOpening> walled_parts(const PlanSegment& segment, const std::vector<WallLine>& walls,
                                       const std::vector<PlanOutline>& openings, double off_m) {
   constexpr double kTurn = 0.05;
   const double length = (segment[1] - segment[0]).norm();
   const Eigen::Vector2d along = (segment[1] - segment[0]) / length;
   std::vector<WallOpening> parts;
+
+  // A side counts if it is parallel and near
   const auto add = [&](const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
     const Eigen::Vector2d side = (to - from).normalized();
     const Eigen::Vector2d middle = 0.5 * (segment[0] + segment[1]) - from;
@@ -237,6 +258,7 @@ std::vector<WallOpening> walled_parts(const PlanSegment& segment, const std::vec
     if (s1 > 0.0 && s0 < 1.0) parts.push_back({std::max(0.0, s0), std::min(1.0, s1)});
   };
 
+  // Walls, and the sides of openings
   for (const WallLine& wall : walls) add(wall.at(wall.s0), wall.at(wall.s1));
   for (const PlanOutline& opening : openings) {
     for (std::size_t i = 0; i < opening.size(); ++i) {
@@ -245,6 +267,7 @@ std::vector<WallOpening> walled_parts(const PlanSegment& segment, const std::vec
     }
   }
 
+  // Parts that touch are joined
   std::sort(parts.begin(), parts.end(),
             [](const WallOpening& a, const WallOpening& b) { return a.s0 < b.s0; });
   std::vector<WallOpening> joined;

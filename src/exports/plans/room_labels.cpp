@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Rooms as the cells that lie inside.
+// Rooms: labels of cells as inside or outside, found by a minimum cut.
 #include <algorithm>
 #include <boost/graph/adjacency_list.hpp>
 #include <boost/graph/boykov_kolmogorov_max_flow.hpp>
@@ -25,6 +25,7 @@ using CutGraph = boost::adjacency_list<
                     boost::property<boost::edge_residual_capacity_t, double,
                                     boost::property<boost::edge_reverse_t, CutTraits::edge_descriptor>>>>;
 
+/// A pair of edges in both directions, as the maximum flow needs them.
 void add_link(CutGraph& graph, std::size_t from, std::size_t to, double there, double back) {
   const auto forth = boost::add_edge(from, to, graph).first;
   const auto reverse = boost::add_edge(to, from, graph).first;
@@ -98,6 +99,7 @@ std::vector<bool> inside_cells(const std::vector<RoomCell>& cells, const std::ve
   constexpr double kBorder = 0.01;   // a metre of any limit
   const std::size_t source = cells.size(), sink = cells.size() + 1;
 
+  // Costs of a cell's label
   CutGraph graph(cells.size() + 2);
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const RoomCell& cell = cells[i];
@@ -106,6 +108,7 @@ std::vector<bool> inside_cells(const std::vector<RoomCell>& cells, const std::ve
              cell.opening ? 1e3 : kUnknown * (1.0 - cell.free) * cell.area_m2 + kBehind * behind[i], 0.0);
   }
 
+  // Cost of a limit between inside and outside
   for (std::size_t k = 0; k < borders.size(); ++k) {
     const auto& [a, b, ends] = borders[k];
     if (cells[a].opening || cells[b].opening) continue;
@@ -118,6 +121,7 @@ std::vector<bool> inside_cells(const std::vector<RoomCell>& cells, const std::ve
   }
   boost::boykov_kolmogorov_max_flow(graph, source, sink);
 
+  // Cells on the source's side of the cut are inside
   std::vector<bool> inside(cells.size());
   const auto free = boost::color_traits<boost::default_color_type>::black();
   for (std::size_t i = 0; i < cells.size(); ++i)
@@ -129,6 +133,7 @@ std::vector<bool> inside_cells(const std::vector<RoomCell>& cells, const std::ve
 /// Number of the room of each cell; -1: outside. Cells belong together where no wall is between them.
 std::vector<int> room_numbers(const std::vector<RoomCell>& cells, const std::vector<CellBorder>& borders,
                               const std::vector<double>& walled, const std::vector<bool>& inside) {
+  // Union-find over borders without a wall
   constexpr double kMostWalled = 0.5;
   std::vector<std::size_t> root(cells.size());
   std::iota(root.begin(), root.end(), std::size_t{0});
@@ -143,6 +148,7 @@ std::vector<int> room_numbers(const std::vector<RoomCell>& cells, const std::vec
       root[std::max(find(a), find(b))] = std::min(find(a), find(b));
   }
 
+  // Rooms are numbered in the order of their cells
   std::map<std::size_t, int> numbers;
   std::vector<int> room(cells.size(), -1);
   for (std::size_t i = 0; i < cells.size(); ++i) {
@@ -170,6 +176,7 @@ std::vector<PlanOutline> outlines_of(const std::vector<PlanSegment>& limits) {
   std::vector<bool> used(limits.size(), false);
   std::vector<PlanOutline> outlines;
 
+  // A closed walk from every limit that is left
   for (std::size_t first = 0; first < limits.size(); ++first) {
     if (used[first]) continue;
     PlanOutline outline;
@@ -178,12 +185,16 @@ std::vector<PlanOutline> outlines_of(const std::vector<PlanSegment>& limits) {
     while (!used[at]) {
       used[at] = true;
       outline.push_back(limits[at][0]);
+
+      // The sharpest left turn at the end of the limit
       const Eigen::Vector2d way = limits[at][1] - limits[at][0];
       double sharpest = -10.0;
       std::size_t next = limits.size();
       for (std::size_t k = 0; k < limits.size(); ++k) {
         if (used[k] && k != first) continue;
         if ((limits[k][0] - limits[at][1]).norm() > kSame_m) continue;
+
+        // Its angle to the limit before
         const Eigen::Vector2d on = limits[k][1] - limits[k][0];
         const double turn = std::atan2(way.x() * on.y() - way.y() * on.x(), way.dot(on));
         if (turn <= sharpest) continue;
@@ -194,6 +205,7 @@ std::vector<PlanOutline> outlines_of(const std::vector<PlanSegment>& limits) {
       at = next;
     }
 
+    // Two corners enclose no area
     if (outline.size() >= 3) outlines.push_back(std::move(outline));
   }
   return outlines;
@@ -234,6 +246,7 @@ std::vector<SidePart> side_parts(const PlanSegment& side, const RoomWalls& of) {
   const double length = length_of(side);
   std::vector<SidePart> parts;
 
+  // Each part that is found leaves a rest for the next kind
   const auto fill = [&](const std::vector<WallOpening>& found, double from, double to, RoomSide kind,
                         const auto& rest) {
     for (const WallOpening& part : found) {
@@ -243,6 +256,8 @@ std::vector<SidePart> side_parts(const PlanSegment& side, const RoomWalls& of) {
         rest(from, s0);
         from = s0;
       }
+
+      // A rest that is too short belongs to this part
       const double end = (to - s1) * length > kNone_m ? s1 : to;
       parts.push_back({from, end, kind});
       from = end;
@@ -251,6 +266,7 @@ std::vector<SidePart> side_parts(const PlanSegment& side, const RoomWalls& of) {
     if ((to - from) * length > 1e-6) rest(from, to);
   };
 
+  // Walls explain a part first, then closings, then far sides
   const auto closed = walled_parts(side, of.closings, {});
   const auto behind = parts_before_far_sides(side, of.walls);
   const auto limit = [&](double from, double to) { parts.push_back({from, to, RoomSide::kLimit}); };
@@ -264,6 +280,8 @@ std::vector<SidePart> side_parts(const PlanSegment& side, const RoomWalls& of) {
 /// Cuts the outline where walls end, and tells what is along each side. Limits that are short are gaps.
 void name_sides(const RoomWalls& of, WallRoom& room) {
   constexpr double kLongestGap_m = 0.6;
+
+  // One corner at each end of a wall
   PlanOutline corners;
   for (std::size_t i = 0; i < room.outline.size(); ++i) {
     const PlanSegment side{room.outline[i], room.outline[(i + 1) % room.outline.size()]};
@@ -275,11 +293,13 @@ void name_sides(const RoomWalls& of, WallRoom& room) {
 
   room.outline = std::move(corners);
 
+  // Begins at a side that is no limit, so that no run is split
   const std::size_t count = room.sides.size();
   const auto other = std::find_if(room.sides.begin(), room.sides.end(),
                                   [](RoomSide side) { return side != RoomSide::kLimit; });
   const auto begin = static_cast<std::size_t>(other == room.sides.end() ? 0 : other - room.sides.begin());
 
+  // A short run is a gap in the walls
   for (std::size_t k = 0; k < count;) {
     double gap_m = 0.0;
     std::size_t end = k;
@@ -303,12 +323,14 @@ Eigen::Vector2d label_place_in(const std::vector<PlanOutline>& rings) {
   Eigen::Vector2d best = box.center();
   double farthest = -1.0;
 
+  // Middles of a grid over the room
   for (int k = 0; k < kSteps * kSteps; ++k) {
     const Eigen::Array2d part((k % kSteps + 0.5) / kSteps, (k / kSteps + 0.5) / kSteps);
     const Eigen::Vector2d place = box.min().array() + part * box.sizes().array();
     if (!is_inside(rings.front(), place)) continue;
     double distance = 1e300;
 
+    // Distance to the nearest ring; places in a hole do not count
     for (const PlanOutline& ring : rings) {
       if (&ring != &rings.front() && is_inside(ring, place)) distance = -1.0;
       for (std::size_t i = 0; i < ring.size(); ++i) {
@@ -318,6 +340,7 @@ Eigen::Vector2d label_place_in(const std::vector<PlanOutline>& rings) {
       }
     }
 
+    // The first of equal places stays
     if (distance <= farthest + 1e-9) continue;
     farthest = distance;
     best = place;
@@ -352,6 +375,7 @@ double WallRoom::perimeter_m() const {
   return sum;
 }
 
+/// Rooms as connected cells that are inside, the largest first.
 std::vector<WallRoom> rooms_in(const Eigen::AlignedBox2d& box, const std::vector<WallLine>& walls,
                                const std::vector<WallLine>& closings, const std::vector<WallDoor>& doors,
                                const FreeSpace& space) {
@@ -361,10 +385,12 @@ std::vector<WallRoom> rooms_in(const Eigen::AlignedBox2d& box, const std::vector
   const std::vector<RoomCell> cells = cells_of(box, all, openings, space);
   const std::vector<CellBorder> borders = borders_of(cells);
 
+  // Labels of the cells
   const std::vector<double> walled = walled_shares(borders, all, openings);
   const std::vector<bool> inside = inside_cells(cells, borders, walled, walls);
   const std::vector<int> room_of = room_numbers(cells, borders, walled, inside);
 
+  // Outline of each room, without needless corners
   std::vector<WallRoom> rooms;
   const int count = room_of.empty() ? 0 : *std::max_element(room_of.begin(), room_of.end()) + 1;
   for (int number = 0; number < count; ++number) {
@@ -374,6 +400,7 @@ std::vector<WallRoom> rooms_in(const Eigen::AlignedBox2d& box, const std::vector
     std::stable_sort(rings.begin(), rings.end(),
                      [](const PlanOutline& a, const PlanOutline& b) { return area_of(a) > area_of(b); });
 
+    // Connected cells that are no room are dropped
     WallRoom room;
     room.outline = rings.front();
     room.area_m2 = area_of(room.outline);
@@ -383,6 +410,7 @@ std::vector<WallRoom> rooms_in(const Eigen::AlignedBox2d& box, const std::vector
     rooms.push_back(std::move(room));
   }
 
+  // Rooms are numbered by area
   std::stable_sort(rooms.begin(), rooms.end(),
                    [](const WallRoom& a, const WallRoom& b) { return a.area_m2 > b.area_m2; });
   return rooms;

@@ -41,14 +41,16 @@ std::vector<Eigen::Vector2d> chain_from(const std::vector<WallLine>& walls, std:
   return from == 0 ? outline : std::vector<Eigen::Vector2d>{};
 }
 
-/// The middle of the widest piece of a line through the outline's middle.
+/// The middle of the widest piece inside of the lines at eighths of the outline's height.
 Eigen::Vector2d label_place(const std::vector<Eigen::Vector2d>& outline, const std::vector<Loop>& loops) {
+  // Height range of the outline
   Eigen::Vector2d low = outline.front(), high = outline.front();
   for (const Eigen::Vector2d& p : outline) {
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
   }
 
+  // Lines at eighths of the height
   Eigen::Vector2d best = 0.5 * (low + high);
   double widest = -1.0;
 
@@ -64,11 +66,13 @@ Eigen::Vector2d label_place(const std::vector<Eigen::Vector2d>& outline, const s
       }
     };
 
+    // Rings of other loops are holes
     add(outline);
     for (const Loop& loop : loops) {
       if (!loop.inwards && is_inside(outline, loop.outline.front())) add(loop.outline);
     }
 
+    // Between odd and even crossings it is inside
     std::sort(crossings.begin(), crossings.end());
     for (std::size_t i = 0; i + 1 < crossings.size(); i += 2) {
       const double width = crossings[i + 1] - crossings[i] + (k == 4 ? 1e-6 : 0.0);
@@ -112,6 +116,8 @@ std::vector<WallRoom> rooms_of(const std::vector<WallLine>& walls) {
     WallRoom room;
     room.outline = loop.outline;
     room.area_m2 = loop.area_m2;
+
+    // Columns and free-standing walls take area away
     for (const Loop& hole : loops) {
       if (!hole.inwards && hole.area_m2 < loop.area_m2 && is_inside(loop.outline, hole.outline.front()))
         room.area_m2 -= hole.area_m2;

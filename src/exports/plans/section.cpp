@@ -15,6 +15,7 @@ namespace {
 constexpr double kSectionCell_m = 0.02;
 using SectionCells = std::set<std::pair<long, long>>;  // by row, then column
 
+/// Cells of the section that hold points of a thin slab around the cut.
 SectionCells cells_near(const cloud::CloudFile& file, const Eigen::Vector2d& from,
                         const Eigen::Vector2d& to) {
   constexpr double kHalfThick_m = 0.03;
@@ -51,6 +52,7 @@ void draw_cells(const SectionCells& cells, std::size_t layer, Drawing& drawing) 
 
 }  // namespace
 
+/// The sheet of a vertical section.
 core::Result<Drawing> section_sheet(MapSource& source, ExportSummary& summary) {
   const std::vector<double>& line = source.options().section;
   if (line.size() != 4) return core::usage_error("--section: takes two places seen from above, x,y,x,y");
@@ -58,6 +60,7 @@ core::Result<Drawing> section_sheet(MapSource& source, ExportSummary& summary) {
   const Eigen::Vector2d to(line[2], line[3]);
   if ((to - from).norm() < kSectionCell_m) return core::usage_error("--section: its two places are one");
 
+  // Points near the cut
   const auto cloud = source.cloud();
   if (!cloud) return tl::unexpected(cloud.error());
   const SectionCells cells = cells_near(**cloud, from, to);
@@ -66,6 +69,7 @@ core::Result<Drawing> section_sheet(MapSource& source, ExportSummary& summary) {
         fmt::format("{}: the section meets no point of the cloud", source.request().output.string()));
   }
 
+  // The title block tells both ends of the section
   SheetFacts facts;
   const std::string what =
       fmt::format("section from {:g},{:g} to {:g},{:g}", line[0], line[1], line[2], line[3]);
@@ -75,6 +79,7 @@ core::Result<Drawing> section_sheet(MapSource& source, ExportSummary& summary) {
     return tl::unexpected(told.error());
   summary.notes.push_back(fmt::format("a section {:.2f} m long", (to - from).norm()));
 
+  // A section has no walls, so the sheet has no tables
   return sheet_of(source.options(), facts, {}, 1.0,
                   [&](const PlanStyle&, const PlanLayers& layers, Drawing& drawing) {
                     draw_cells(cells, layers.wall, drawing);

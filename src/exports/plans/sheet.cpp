@@ -75,6 +75,7 @@ struct TitleRow {
 
 constexpr double kName_mm = 23.0;  ///< column of the names
 
+/// Rows of the title block; values are broken to the width of the column.
 std::vector<TitleRow> title_rows(const SheetFacts& facts, const DrawingSheet& sheet) {
   std::vector<TitleRow> rows;
   const auto add = [&](const std::string& name, const std::string& value, double height_mm) {
@@ -148,6 +149,7 @@ std::vector<std::pair<std::string, std::string>> legend_of(const Drawing& drawin
   return legend;
 }
 
+/// The legend: a sample of each sign with its meaning.
 void draw_legend(Drawing& drawing, SheetWriter& writer, std::size_t layer, double x, double y,
                  const std::vector<std::pair<std::string, std::string>>& legend) {
   for (const auto& [sign, text] : legend) {
@@ -156,6 +158,7 @@ void draw_legend(Drawing& drawing, SheetWriter& writer, std::size_t layer, doubl
                                             writer.at(x + 14, high), writer.at(x, high)};
     const Eigen::Vector2d side = ring[1] - ring[0], up = ring[3] - ring[0];
 
+    // Samples are drawn as the plan draws them
     if (sign == "wall") {
       drawing.areas.push_back({layer, {ring}, 1.2 * drawing.sheet.mm()});
       drawing.lines.push_back({layer, ring, true});
@@ -173,6 +176,7 @@ void draw_legend(Drawing& drawing, SheetWriter& writer, std::size_t layer, doubl
       drawing.line(layer, writer.at(x, middle), writer.at(x + 14, middle), true);
     }
 
+    // Text next to the sample
     writer.text(x + 17.0, middle, text);
     y -= kLine_mm + 0.6;
   }
@@ -182,6 +186,8 @@ void draw_legend(Drawing& drawing, SheetWriter& writer, std::size_t layer, doubl
 void draw_scale(const Drawing& drawing, SheetWriter& writer, const PlanStyle& style, bool georeferenced,
                 double x, double y) {
   constexpr std::array<double, 9> kBars_m{0.5, 1, 2, 5, 10, 20, 50, 100, 200};
+
+  // The shortest bar of more than 25 mm
   const double metre_mm = style.unit / drawing.sheet.mm();
   const double bar_m =
       *std::find_if(kBars_m.begin(), kBars_m.end() - 1, [&](double m) { return m * metre_mm > 25.0; });
@@ -191,6 +197,7 @@ void draw_scale(const Drawing& drawing, SheetWriter& writer, const PlanStyle& st
   }
   writer.text(x + bar_m * metre_mm + 2.0, y - 0.8, style.number(bar_m, bar_m < 1.0 ? 1 : 0) + " m");
 
+  // Georeferenced plans have north up
   const double tip = x + kColumn_mm - 8.0;
   const bool north = georeferenced;
   writer.line(tip - (north ? 0.0 : 14.0), y - 7.0, tip, y + (north ? 7.0 : -7.0));
@@ -198,6 +205,8 @@ void draw_scale(const Drawing& drawing, SheetWriter& writer, const PlanStyle& st
     writer.line(tip, y + (north ? 7.0 : -7.0), tip + (north ? off : -3.0), y + (north ? 4.0 : -7.0 + off));
   writer.text(tip + (north ? 1.8 : 1.2), y + (north ? 5.0 : -7.0), north ? "N" : "x");
   if (north) return;
+
+  // Other plans show both axes
   writer.line(tip - 14.0, y - 7.0, tip - 14.0, y + 7.0);
   for (const double off : {-1.2, 1.2}) writer.line(tip - 14.0, y + 7.0, tip - 14.0 + off, y + 4.0);
   writer.text(tip - 12.5, y + 6.0, "y");
@@ -207,6 +216,8 @@ void draw_scale(const Drawing& drawing, SheetWriter& writer, const PlanStyle& st
 void draw_coordinates(Drawing& drawing, SheetWriter& writer, const PlanLayers& layers, double right_mm,
                       double top_mm) {
   constexpr std::array<double, 9> kSteps_m{1, 2, 5, 10, 20, 50, 100, 200, 500};
+
+  // Steps of more than 38 mm
   const double mm = drawing.sheet.mm();
   const double step =
       *std::find_if(kSteps_m.begin(), kSteps_m.end() - 1, [&](double m) { return m / mm > 38.0; });
@@ -214,6 +225,7 @@ void draw_coordinates(Drawing& drawing, SheetWriter& writer, const PlanLayers& l
   const double edge = kInside_mm * mm;
   SheetWriter grid(drawing, layers.grid);
 
+  // Values along the lower and the left edge
   for (const int axis : {0, 1}) {
     for (double value = std::ceil((low[axis] + 2.0 * edge) / step) * step; value < high[axis] - 2.0 * edge;
          value += step) {
@@ -222,6 +234,8 @@ void draw_coordinates(Drawing& drawing, SheetWriter& writer, const PlanLayers& l
                      fmt::format("{:.0f}", value + 0.0)};
       text.at = axis == 0 ? writer.at(along, kMargin_mm + 4.0) : writer.at(kLeft_mm + 4.0, along);
       drawing.texts.push_back(text);
+
+      // Marks at both edges
       axis == 0 ? grid.line(along, kMargin_mm, along, kMargin_mm + 2.0)
                 : grid.line(kLeft_mm, along, kLeft_mm + 2.0, along);
       axis == 0 ? grid.line(along, top_mm - 2.0, along, top_mm)
@@ -229,6 +243,7 @@ void draw_coordinates(Drawing& drawing, SheetWriter& writer, const PlanLayers& l
     }
   }
 
+  // Crosses within the drawing
   const Eigen::Array2d first = ((low.array() + 2.0 * edge) / step).ceil() * step;
   for (double x = first.x(); x < high.x() - edge; x += step) {
     for (double y = first.y(); y < high.y() - edge; y += step) {
@@ -324,6 +339,8 @@ bool put_on_sheet(const SheetOptions& options, const SheetFacts& facts, const Pl
       // The drawing is in the middle, all else around it.
       const Eigen::Vector2d middle(0.5 * (kLeft_mm + right), 0.5 * (kMargin_mm + top));
       drawing.sheet.low = 0.5 * (low + high) - mm * middle;
+
+      // Parts around the drawing
       SheetWriter writer(drawing, layers.anno);
       const double x = drawing.sheet.width_mm - kMargin_mm - kColumn_mm;
       writer.box(kLeft_mm, kMargin_mm, drawing.sheet.width_mm - kMargin_mm, top);

@@ -51,10 +51,12 @@ WallOpening widened(const WallRaster& raster, const WallLine& wall, WallOpening 
 
 /// The line through two pieces of one, each of which counts by its length.
 WallLine joined_pieces(const WallLine& a, const WallLine& b) {
+  // The middle, weighted by length
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
   for (const WallLine* piece : {&a, &b})
     middle += piece->length() * piece->at(0.5 * (piece->s0 + piece->s1)) / (a.length() + b.length());
 
+  // Scatter of both pieces about it
   Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
   for (const WallLine* piece : {&a, &b}) {
     const Eigen::Vector2d off = piece->at(0.5 * (piece->s0 + piece->s1)) - middle;
@@ -62,6 +64,7 @@ WallLine joined_pieces(const WallLine& a, const WallLine& b) {
     spread += piece->length() * (off * off.transpose() + own * piece->along() * piece->along().transpose());
   }
 
+  // The normal is the direction of least scatter
   const Eigen::Vector2d across = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(spread).eigenvectors().col(0);
   WallLine line = a;
   line.normal = across.dot(a.normal) < 0.0 ? Eigen::Vector2d(-across) : across;
@@ -72,6 +75,7 @@ WallLine joined_pieces(const WallLine& a, const WallLine& b) {
   line.openings.clear();
   line.gaps.clear();
 
+  // Openings and gaps on the new line
   for (const WallLine* piece : {&a, &b}) {
     const auto on_line = [&](const WallOpening& part) -> WallOpening {
       return {line.along().dot(piece->at(part.s0)), line.along().dot(piece->at(part.s1))};
@@ -81,6 +85,7 @@ WallLine joined_pieces(const WallLine& a, const WallLine& b) {
     std::transform(piece->gaps.begin(), piece->gaps.end(), std::back_inserter(line.gaps), on_line);
   }
 
+  // The far end is that of the second piece
   line.corner[1] = b.corner[1];
   line.top_m = std::max(a.top_m, b.top_m);
   line.high = std::max(a.high, b.high);
@@ -105,8 +110,11 @@ void level_openings(const WallLine& a, WallOpening& of_a, const WallLine& b, Wal
 
 }  // namespace
 
+/// Openings in a wall: runs of columns without surface that a door may have.
 std::vector<WallOpening> openings_between(const WallRaster& raster, double s0, double s1, const Cut& cut) {
   constexpr int kBridge = 3;  // columns with a door's handle or the like
+
+  // Runs of open columns, joined over handles
   std::vector<std::pair<int, int>> runs;
   for (int c = raster.column_of(s0); c <= raster.column_of(s1); ++c) {
     if (!open_column(raster, c, cut)) continue;
@@ -117,6 +125,7 @@ std::vector<WallOpening> openings_between(const WallRaster& raster, double s0, d
     }
   }
 
+  // Widths of doors only
   std::vector<WallOpening> openings;
   for (const auto& [a, b] : runs) {
     const WallOpening opening{raster.start_of(a), raster.start_of(b + 1)};
@@ -128,6 +137,7 @@ std::vector<WallOpening> openings_between(const WallRaster& raster, double s0, d
   return openings;
 }
 
+/// Joins pieces of walls in line, over a door or a hidden part.
 void bridge_gaps(std::vector<WallLine>& walls, std::vector<Fronts>& fronts, const Cut& cut) {
   constexpr double kLongest_m = 1.6;
   constexpr double kSameLine_m = 0.025;
@@ -137,16 +147,19 @@ void bridge_gaps(std::vector<WallLine>& walls, std::vector<Fronts>& fronts, cons
       const WallLine& b = walls[j];
       if (i == j || a.corner[1] >= 0 || b.corner[0] >= 0 || a.normal.dot(b.normal) < 0.998) continue;
 
+      // Pieces in line with a short gap
       const double from = a.along().dot(b.at(b.s0));
       const double gap = from - a.s1;
       if (gap <= 0.0 || gap > kLongest_m || std::abs(a.normal.dot(b.at(b.s0)) - a.offset_m) > kSameLine_m)
         continue;
 
+      // Cameras that saw through make it an opening
       const WallRaster& front = *fronts[i].last;
       const bool crossed = is_passage(front, front.column_at(a.at(a.s1)), front.column_at(b.at(b.s0)),
                                       {cut.at_m, cut.low_m, cut.high_m, true});
       if (crossed && gap < kNarrowestDoor_m) continue;
 
+      // An opening, else hidden wall with its gaps
       if (crossed || !cut.rays_known) {
         a.openings.push_back(widened(front, a, {a.s1, from}, cut));
       } else {
@@ -156,6 +169,7 @@ void bridge_gaps(std::vector<WallLine>& walls, std::vector<Fronts>& fronts, cons
       a = joined_pieces(a, b);
       fronts[i].last = fronts[j].last;
 
+      // Corners and numbers change with the walls
       walls.erase(walls.begin() + static_cast<std::ptrdiff_t>(j));
       fronts.erase(fronts.begin() + static_cast<std::ptrdiff_t>(j));
       join_corners(walls);
@@ -193,6 +207,8 @@ std::vector<WallDoor> doors_of(std::vector<WallLine>& walls) {
           const double common =
               std::min(opening.s1, wall.along().dot(far[1])) - std::max(opening.s0, wall.along().dot(far[0]));
           if (used[j][m] || behind < 0.0 || behind > kThickestWall_m || common < 0.5 * door.width_m) continue;
+
+          // Both faces get the same opening
           used[j][m] = true;
           level_openings(wall, opening, walls[j], walls[j].openings[m]);
           door.jambs = {wall.at(opening.s0), wall.at(opening.s1)};
@@ -238,22 +254,27 @@ std::vector<WallDoor> doors_between_sides(const std::vector<WallLine>& walls,
   return doors;
 }
 
+/// Finds the wall's other face for openings that were seen from one side only.
 void find_far_sides(const std::vector<WallLine>& walls, std::vector<WallDoor>& doors) {
   constexpr double kThinnest_m = 0.03;
   constexpr double kBeside_m = 0.3;
   for (WallDoor& door : doors) {
+    // The far side is behind the jambs
     const Eigen::Vector2d along = (door.jambs[1] - door.jambs[0]).normalized();
     const Eigen::Vector2d behind(-along.y(), along.x());
 
     if ((door.far_jambs[0] - door.jambs[0]).norm() > kThinnest_m) continue;
     double nearest = kThickestWall_m;
 
+    // The nearest face that points away
     for (const WallLine& wall : walls) {
       const double distance = behind.dot(wall.at(0.5 * (wall.s0 + wall.s1)) - door.jambs[0]);
       if (wall.normal.dot(behind) < 0.99 || distance < kThinnest_m || distance > nearest) continue;
       const double first = along.dot(wall.at(wall.s1) - door.jambs[0]);  // it runs backwards
       const double last = along.dot(wall.at(wall.s0) - door.jambs[0]);
       if (first > door.width_m + kBeside_m || last < -kBeside_m) continue;
+
+      // Its line gives the depth at each jamb
       nearest = distance;
       for (std::size_t k = 0; k < 2; ++k) {
         const double off = wall.normal.dot(door.jambs[k]) - wall.offset_m;
@@ -263,6 +284,7 @@ void find_far_sides(const std::vector<WallLine>& walls, std::vector<WallDoor>& d
   }
 }
 
+/// The line across an opening, as if it were a wall.
 WallLine closing_of(const WallDoor& door) {
   const Eigen::Vector2d along = (door.jambs[1] - door.jambs[0]).normalized();
   WallLine line;
@@ -310,6 +332,7 @@ std::optional<double> way_to_face(const Eigen::Vector2d& from, const Eigen::Vect
 
 }  // namespace
 
+/// Openings between a free end of a wall and the next wall on its way.
 std::vector<WallDoor> doors_at_free_ends(const std::vector<WallLine>& walls,
                                          const std::vector<WallDoor>& doors) {
   constexpr double kFarthest_m = 1.7;
@@ -318,12 +341,15 @@ std::vector<WallDoor> doors_at_free_ends(const std::vector<WallLine>& walls,
   for (const WallLine& wall : walls) {
     for (std::size_t end = 0; end < 2; ++end) {
       if (wall.corner[end] >= 0) continue;
+
+      // A wall with one corner is surely a wall, so it may reach further
       const Eigen::Vector2d from = wall.at(end == 0 ? wall.s0 : wall.s1);
       const Eigen::Vector2d way = end == 0 ? Eigen::Vector2d(-wall.along()) : wall.along();
       const auto distance =
           way_to_face(from, way, walls, wall.corner[1 - end] >= 0 ? kFarthestMet_m : kFarthest_m);
       if (!distance || is_at_door(wall, from, doors)) continue;
 
+      // Jambs in the wall's direction
       const Eigen::Vector2d to = from + *distance * way;
       WallDoor door;
       door.jambs = {end == 0 ? to : from, end == 0 ? from : to};

@@ -42,14 +42,16 @@ bool stands_before_wall(const WallLine& side, const std::vector<WallLine>& walls
   constexpr double kReach_m = 0.4;
   constexpr double kSeenBehind = 0.6;  // share of the side
   bool before = false, behind = false;
-
   double seen_m = 0.0;
+
+  // Walls that face the same way, further back
   for (const WallLine& wall : walls) {
     if (wall.normal.dot(side.normal) < 0.998) continue;
     const double s0 = wall.along().dot(side.at(side.s0));
     const double s1 = wall.along().dot(side.at(side.s1));
     const double distance = wall.normal.dot(side.at(0.5 * (side.s0 + side.s1))) - wall.offset_m;
 
+    // One wall that reaches beyond both ends
     if (distance < kNearest_m || distance > kFarthest_m) continue;
     if (wall.s0 - kReach_m < s0 && wall.s1 + kReach_m > s1 && wall.length() > side.length()) return true;
     seen_m += std::max(0.0, std::min(wall.s1, s1) - std::max(wall.s0, s0));
@@ -57,6 +59,7 @@ bool stands_before_wall(const WallLine& side, const std::vector<WallLine>& walls
     behind = behind || (wall.s1 > s1 && wall.s0 < s1 + kReach_m);
   }
 
+  // Seen left and right, or over the side
   return (before && behind) || seen_m > kSeenBehind * side.length();
 }
 
@@ -101,6 +104,7 @@ bool is_askew(const WallLine& side, const std::vector<WallLine>& walls) {
 
 }  // namespace
 
+/// Drops low sides that are not one face of a low wall.
 void drop_low_furniture(std::vector<WallLine>& walls) {
   const std::vector<WallLine> all = walls;
   const auto is_furniture = [&](const WallLine& side) {
@@ -111,11 +115,13 @@ void drop_low_furniture(std::vector<WallLine>& walls) {
   walls.erase(std::remove_if(walls.begin(), walls.end(), is_furniture), walls.end());
 }
 
+/// Drops low sides that cameras saw over, and sides that stand before a wall.
 void drop_furniture(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, bool rays_known) {
   constexpr double kLongest_m = 3.0;  // longest furniture
   constexpr double kLeastHigh = 0.2;  // share of a side that must be higher than furniture
   const std::vector<WallLine> all = walls;
   keep_sides(walls, rasters, [&](std::size_t i) {
+    // Two low faces of a thin wall are a wall
     const bool high = walls[i].high >= kLeastHigh || walls[i].low ||
                       std::any_of(all.begin(), all.end(), [&](const WallLine& other) {
                         return other.high < kLeastHigh && are_faces(all[i], other);
@@ -125,6 +131,7 @@ void drop_furniture(std::vector<WallLine>& walls, std::vector<WallRaster>& raste
   });
 }
 
+/// Drops short sides that nothing connects to a wall.
 void drop_loose_sides(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters) {
   constexpr double kShort_m = 1.5;
   constexpr double kStub_m = 0.6;
@@ -133,12 +140,15 @@ void drop_loose_sides(std::vector<WallLine>& walls, std::vector<WallRaster>& ras
   join_corners(joined);
 
   keep_sides(walls, rasters, [&](std::size_t i) {
+    // Long sides need no support
     if (walls[i].length() >= kShort_m) return true;
     if (is_askew(walls[i], walls)) return false;
 
+    // Corners at both ends support a side
     const bool met = joined[i].corner[0] >= 0 && joined[i].corner[1] >= 0;
     if (met && walls[i].length() >= kStub_m) return true;
 
+    // A long wall at a right angle supports it
     const bool square = std::any_of(joined[i].corner.begin(), joined[i].corner.end(), [&](int other) {
       return other >= 0 &&
              std::abs(joined[i].normal.dot(joined[static_cast<std::size_t>(other)].normal)) < kSquare &&
@@ -146,6 +156,7 @@ void drop_loose_sides(std::vector<WallLine>& walls, std::vector<WallRaster>& ras
     });
     if (square) return true;
 
+    // A wall in line supports it
     return std::any_of(walls.begin(), walls.end(), [&](const WallLine& other) {
       return &other != &walls[i] && other.length() >= 0.5 * kShort_m && in_line(walls[i], other);
     });

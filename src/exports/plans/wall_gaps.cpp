@@ -68,14 +68,16 @@ bool is_window(const WallRaster& raster, int first, int last, const Cut& cut) {
 
 }  // namespace
 
+/// Gaps at the height of the cut: windows, and parts that cameras saw through.
 std::vector<WallOpening> gaps_between(const WallRaster& raster, double s0, double s1, const Cut& cut) {
   constexpr int kBridge = 5;  // columns with the bars of a window
   constexpr int kBeside = 3;  // columns of wall on both sides of a window
   constexpr double kNarrowest_m = 0.3;
   constexpr double kLowestSill_m = 0.25;
   const int begin = raster.column_of(s0);
-
   const int end = raster.column_of(s1);
+
+  // Runs of columns without surface at the cut
   std::vector<std::pair<int, int>> runs;
   for (int c = begin; c <= end; ++c) {
     const bool over_sill = is_bare(raster, c, cut) && sill_of(raster, c, cut) > kLowestSill_m;
@@ -88,11 +90,13 @@ std::vector<WallOpening> gaps_between(const WallRaster& raster, double s0, doubl
     }
   }
 
+  // Narrow runs are noise
   std::vector<WallOpening> gaps;
   for (const auto& [a, b] : runs) {
     const WallOpening gap{std::max(s0, raster.start_of(a)), std::min(s1, raster.start_of(b + 1))};
     if (gap.s1 - gap.s0 < kNarrowest_m) continue;
 
+    // Mostly seen through, or over a level sill
     int crossed = 0;
     for (int c = a; c <= b; ++c) crossed += is_crossed(raster, c, cut) ? 1 : 0;
     const bool beside = a >= begin + kBeside && b <= end - kBeside;
@@ -102,6 +106,7 @@ std::vector<WallOpening> gaps_between(const WallRaster& raster, double s0, doubl
   return gaps;
 }
 
+/// Finds the gaps of every side; sides that the cut mostly passes over are dropped.
 void cut_sides(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, const Cut& cut) {
   constexpr double kMostCrossed = 0.7;  // share of a side that the cut passes over or below
   for (std::size_t i = 0; i < walls.size();) {
@@ -119,6 +124,7 @@ void cut_sides(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, c
   }
 }
 
+/// Drops gaps that cover most of a door, for they are that door.
 void drop_gaps_at_doors(WallLine& wall) {
   const auto is_door = [&](const WallOpening& gap) {
     return std::any_of(wall.openings.begin(), wall.openings.end(), [&](const WallOpening& door) {

@@ -36,6 +36,8 @@ void WallRaster::add_rays(const ViewRays& rays) {
   constexpr double kBehind_m = 0.08;  // further than noise
   constexpr double kBefore_m = 0.04;  // flat things on a wall are in front of it
   constexpr double kAtWall_m = 0.4;   // things further from it hide a part from some places only
+
+  // Signed distances tell rays that pass from rays that end before the wall
   const double origin = normal_.dot(rays.origin.head<2>()) - offset_m_;
   for (const Eigen::Vector3f& end_f : rays.ends) {
     const Eigen::Vector3d end = end_f.cast<double>();
@@ -50,6 +52,7 @@ void WallRaster::add_rays(const ViewRays& rays) {
 
 double WallRaster::share(const std::vector<std::uint8_t>& cells, int column, double low_m,
                          double high_m) const {
+  // At least one row
   const int low = std::clamp(static_cast<int>(std::floor(low_m / kHeight_m)), 0, kRows - 1);
   const int high = std::clamp(static_cast<int>(std::ceil(high_m / kHeight_m)), low + 1, kRows);
   int marked = 0;
@@ -59,6 +62,7 @@ double WallRaster::share(const std::vector<std::uint8_t>& cells, int column, dou
 }
 
 double WallRaster::top(int column, double below_m) const {
+  // The highest row with surface below the limit
   const int rows = std::clamp(static_cast<int>(std::lround(below_m / kHeight_m)), 0, kRows);
   for (int row = rows - 1; row >= 0; --row) {
     if (surface_[static_cast<std::size_t>(column) * kRows + static_cast<std::size_t>(row)] != 0)

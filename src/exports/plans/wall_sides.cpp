@@ -153,6 +153,7 @@ struct RunLook {
   double at_cut = 0.0;  ///< share of the cells around the cut that show surface
 };
 
+/// Shares of a run that are high, and at the height of the cut.
 RunLook look_of(const WallRaster& raster, const std::pair<int, int>& run, double need_m, double cut_m) {
   RunLook look;
   const int columns = run.second - run.first + 1;
@@ -163,6 +164,7 @@ RunLook look_of(const WallRaster& raster, const std::pair<int, int>& run, double
   return look;
 }
 
+/// True if a run reaches high enough for a wall, also where cameras looked down.
 bool is_tall(const WallRaster& raster, const std::pair<int, int>& run, double need_m, double cut_m) {
   constexpr double kTall_m = 1.6;  // cameras that are held look down, and see little above this
   constexpr double kLeastTall = 0.2;
@@ -285,6 +287,7 @@ bool covers(const WallLine& large, const WallLine& small) {
 
 }  // namespace
 
+/// Fits every wall to its own points once more; openings keep their places.
 void fit_sides(const cloud::Cloud& cloud, double floor_m, const core::Executor& executor,
                std::vector<WallLine>& walls) {
   const evaluate::SurfaceSamples samples = upright_samples(cloud, floor_m);
@@ -296,6 +299,7 @@ void fit_sides(const cloud::Cloud& cloud, double floor_m, const core::Executor& 
       if (s >= wall.s0 && s <= wall.s1) places.emplace_back(p.head<2>());
     }
 
+    // Places along the line change with its direction
     const WallLine before = wall;
     fit_line(places, wall);
     for (auto* parts : {&wall.openings, &wall.gaps}) {
@@ -305,9 +309,12 @@ void fit_sides(const cloud::Cloud& cloud, double floor_m, const core::Executor& 
   });
 }
 
+/// Straight pieces of walls, without those that a larger piece covers.
 std::vector<WallLine> wall_sides(const cloud::Cloud& cloud, double floor_m, double cut_m,
                                  const core::Executor& executor) {
   constexpr int kMostPlanes = 80;
+
+  // Planes of the cloud's upright patches
   const evaluate::SurfaceSamples samples = upright_samples(cloud, floor_m);
   evaluate::WallThicknessOptions patch_options;
   evaluate::WallPlanesOptions plane_options;
@@ -316,18 +323,21 @@ std::vector<WallLine> wall_sides(const cloud::Cloud& cloud, double floor_m, doub
   const auto planes =
       evaluate::wall_planes(samples, std::move(patches), patch_options.patch_m, plane_options);
 
+  // Planes are independent, so they run in parallel
   const double need_m = wall_height(samples);
   std::vector<std::vector<Side>> found(planes.size());
   executor.parallel_for(planes.size(), [&](std::size_t i) {
     if (std::abs(planes[i].normal.z()) < kWallUpright) found[i] = sides_on(samples, planes[i], need_m, cut_m);
   });
 
+  // Tall sides come first, then those with many points
   std::vector<Side> sides;
   for (const auto& of_plane : found) sides.insert(sides.end(), of_plane.begin(), of_plane.end());
   std::stable_sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
     return a.line.low != b.line.low ? b.line.low : a.points > b.points;
   });
 
+  // Pictures and panels on a wall are dropped
   std::vector<WallLine> walls;
   for (const Side& side : sides) {
     const bool covered = std::any_of(walls.begin(), walls.end(),

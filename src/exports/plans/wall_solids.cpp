@@ -31,6 +31,7 @@ std::vector<SolidPart> thickness_along(const WallLine& wall, const std::vector<W
   std::vector<SolidPart> behind;
   std::vector<double> cuts{s0, s1};
 
+  // Faces opposite, within the thickness of a wall
   for (const WallLine& other : walls) {
     const double distance = wall.offset_m - wall.normal.dot(other.at(0.5 * (other.s0 + other.s1)));
     if (wall.normal.dot(other.normal) > -0.99 || distance < kThinnest_m || distance > kThickestWall_m)
@@ -44,6 +45,7 @@ std::vector<SolidPart> thickness_along(const WallLine& wall, const std::vector<W
     }
   }
 
+  // Between two cuts the nearest face behind is the same
   std::sort(cuts.begin(), cuts.end());
   std::vector<SolidPart> parts;
 
@@ -74,6 +76,7 @@ void extend_to_corners(const WallLine& wall, const std::vector<WallLine>& walls,
   }
 }
 
+/// The area together with the part of the wall, on whole coordinates.
 SolidArea united(const SolidArea& area, const WallLine& wall, const SolidPart& part, double thickness,
                  const Eigen::Vector2d& origin) {
   SolidPolygon quad;
@@ -88,16 +91,20 @@ SolidArea united(const SolidArea& area, const WallLine& wall, const SolidPart& p
   return result;
 }
 
+/// Adds the polygons of an area, simplified, in metres.
 void add_solids(const SolidArea& area, bool assumed, const Eigen::Vector2d& origin,
                 std::vector<WallSolid>& solids) {
   constexpr double kStraight_m = 0.003, kSmallest_m2 = 0.002;
   SolidArea simple;
   bg::simplify(area, simple, kStraight_m / kSolidStep_m);
 
+  // Slivers come from rounding
   for (const SolidPolygon& polygon : simple) {
     if (bg::area(polygon) * kSolidStep_m * kSolidStep_m < kSmallest_m2) continue;
     WallSolid solid;
     solid.assumed = assumed;
+
+    // boost's rings repeat their first point
     const auto add = [&](const auto& ring) {
       if (ring.size() < 4) return;
       auto& points = solid.rings.emplace_back();
@@ -113,10 +120,13 @@ void add_solids(const SolidArea& area, bool assumed, const Eigen::Vector2d& orig
 
 }  // namespace
 
+/// Solids of all walls: as thick as observed, else as assumed.
 std::vector<WallSolid> wall_solids(const WallPlan& plan, double unit) {
   if (plan.walls.empty()) return {};
   const Eigen::Vector2d origin = plan.walls.front().at(plan.walls.front().s0);
   SolidArea known, assumed;
+
+  // Each piece between openings has the thickness behind it
   for (const WallLine& wall : plan.walls) {
     std::vector<SolidPart> parts;
     for (const auto& [s0, s1] : solid_pieces(wall)) {
@@ -124,6 +134,7 @@ std::vector<WallSolid> wall_solids(const WallPlan& plan, double unit) {
       parts.insert(parts.end(), more.begin(), more.end());
     }
 
+    // Assumed thickness only where none was observed
     extend_to_corners(wall, plan.walls, unit, parts);
     const double other_m = wall.thickness_m > 0.0 ? wall.thickness_m : kAssumedThickness_m * unit;
     for (const SolidPart& part : parts) {
@@ -132,6 +143,7 @@ std::vector<WallSolid> wall_solids(const WallPlan& plan, double unit) {
     }
   }
 
+  // Assumed solids end where observed ones begin
   SolidArea rest;
   bg::difference(assumed, known, rest);
   std::vector<WallSolid> solids;

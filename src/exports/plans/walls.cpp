@@ -37,6 +37,7 @@ std::vector<WallRaster> rasters_of(const std::vector<WallLine>& walls, const clo
   return rasters;
 }
 
+/// An error with the heights of the points, from which a user can choose another cut.
 core::Error no_wall_error(const MapSource& source, const cloud::CloudFile& file) {
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
@@ -73,6 +74,7 @@ std::vector<WallLine> close_free_ends(const cloud::Cloud& cloud, double floor_m,
   find_far_sides(plan.walls, at_ends);
   std::vector<WallLine> closings;
 
+  // Each candidate is measured in the cloud
   for (const WallDoor& door : at_ends) {
     std::vector<WallDoor> measured{door};
     measure_doors(cloud, floor_m, measured);
@@ -82,6 +84,7 @@ std::vector<WallLine> close_free_ends(const cloud::Cloud& cloud, double floor_m,
              2.0 * (kSame_m + other.depth_m());
     });
 
+    // Both jambs must have been seen
     if (!again && m.jamb_seen[0] && m.jamb_seen[1] && m.width_m > kNarrowestDoor_m) {
       plan.doors.push_back(m);
     } else {
@@ -131,11 +134,100 @@ void set_thickness(std::vector<WallLine>& walls) {
   }
 }
 
+/// The cloud that a plan is made of, in coordinates less its shift.
+struct PlanCloud {
+  const cloud::Cloud& points;
+  double floor_m;
+  double cut_m;
+};
+
+/// Rays of all views into the space and onto the walls; the views may be unknown.
+core::Result<void> see_through_views(MapSource& source, FreeSpace& space, std::vector<WallRaster>& rasters) {
+  return for_each_view(source, [&](const ViewRays& rays) -> core::Result<void> {
+    space.add(rays);
+    source.executor().parallel_for(rasters.size(), [&](std::size_t i) { rasters[i].add_rays(rays); });
+    return {};
+  });
+}
+
+/// A cut and the heights beside it that tell an opening from what hides a wall.
+Cut cut_at(double cut_m, bool rays_known) {
+  constexpr double kLintel_m = 2.0;
+  return {cut_m, std::max(0.25, cut_m - 0.3), std::clamp(cut_m + 0.3, 0.0, std::max(kLintel_m, cut_m + 0.1)),
+          rays_known};
+}
+
+/// Finds openings in walls and joins pieces of one wall over them; the rasters of each joined side.
+std::vector<Fronts> join_sides(const PlanCloud& of, const core::Executor& executor, const Cut& cut,
+                               std::vector<WallRaster>& rasters, std::vector<WallLine>& walls) {
+  join_corners(walls);
+  for (std::size_t i = 0; i < walls.size(); ++i)
+    walls[i].openings = openings_between(rasters[i], walls[i].s0, walls[i].s1, cut);
+
+  std::vector<Fronts> fronts;
+  for (WallRaster& raster : rasters) {
+    const auto front = std::make_shared<const WallRaster>(std::move(raster));
+    fronts.push_back({front, front});
+  }
+
+  // Lines are fitted again, for joined pieces have more points
+  bridge_gaps(walls, fronts, cut);
+  fit_sides(of.points, of.floor_m, executor, walls);
+  join_corners(walls);
+  meet_hidden_walls(walls);
+
+  for (WallLine& wall : walls) {
+    drop_gaps_at_doors(wall);
+    for (auto* parts : {&wall.openings, &wall.gaps}) {
+      std::sort(parts->begin(), parts->end(),
+                [](const WallOpening& a, const WallOpening& b) { return a.s0 < b.s0; });
+    }
+  }
+  return fronts;
+}
+
+/// Doors seen from both sides, then from one.
+void add_doors(const PlanCloud& of, const std::vector<Fronts>& fronts, const Cut& cut, WallPlan& plan) {
+  plan.doors = doors_of(plan.walls);
+  const std::vector<WallDoor> more = doors_between_sides(plan.walls, fronts, cut);
+  plan.doors.insert(plan.doors.end(), more.begin(), more.end());
+  find_far_sides(plan.walls, plan.doors);
+  measure_doors(of.points, of.floor_m, plan.doors);
+}
+
+/// Rooms of the free space between walls and closed doors; such rooms need not have a wall all around.
+void add_open_rooms(const PlanCloud& of, FreeSpace& space, WallPlan& plan) {
+  std::vector<WallLine> closings = close_free_ends(of.points, of.floor_m, plan);
+  for (const WallDoor& door : plan.doors) {
+    WallDoor behind = door;
+    behind.jambs = door.far_jambs;
+    for (const WallDoor& side : {door, behind})
+      closings.push_back(to_next_walls(closing_of(side), plan.walls));
+  }
+  plan.rooms = rooms_in(box_of(plan.walls), plan.walls, closings, plan.doors, space);
+}
+
+/// Leaves, windows, furniture and heights, which need the final walls.
+void furnish_plan(const PlanCloud& of, WallPlan& plan) {
+  cut_walls_at(plan.doors, plan.walls);
+  find_leaves(of.points, of.floor_m, plan.walls, plan.doors);
+  const std::vector<WallDoor> windows = windows_of(of.points, of.floor_m, of.cut_m, plan.walls);
+  cut_walls_at(windows, plan.walls);
+  plan.doors.insert(plan.doors.end(), windows.begin(), windows.end());
+
+  set_thickness(plan.walls);
+  plan.furniture = furniture_outlines(of.points, of.floor_m, plan.walls);
+  measure_heights(of.points, of.floor_m, plan.rooms);
+}
+
 }  // namespace
 
+/// Moves a plan by a similarity, such as into world coordinates.
 WallPlan moved(WallPlan plan, const Eigen::Matrix2d& linear, const Eigen::Vector2d& origin) {
   const double scale = linear.col(0).norm();
   const auto move = [&](Eigen::Vector2d& place) { place = origin + linear * place; };
+
+  // Places along walls change with the origin
   for (WallLine& wall : plan.walls) {
     wall.normal = linear * wall.normal / scale;
     wall.offset_m = scale * wall.offset_m + wall.normal.dot(origin);
@@ -148,6 +240,7 @@ WallPlan moved(WallPlan plan, const Eigen::Matrix2d& linear, const Eigen::Vector
     }
   }
 
+  // Places of doors, furniture and rooms
   for (WallDoor& door : plan.doors) {
     for (auto* jambs : {&door.jambs, &door.far_jambs}) std::for_each(jambs->begin(), jambs->end(), move);
   }
@@ -172,88 +265,36 @@ core::Result<WallPlan> find_walls(MapSource& source) {
   }
 
   // Floats hold the points only less their shift, which a map with rays has not.
-  const double floor_m = source.floor_m() - (*cloud)->shift.z();
-  const double cut_m = source.options().cut_m;
-  const cloud::Cloud& points = *(*cloud)->cloud;
+  const PlanCloud of{*(*cloud)->cloud, source.floor_m() - (*cloud)->shift.z(), source.options().cut_m};
   WallPlan plan;
 
-  plan.walls = wall_sides(points, floor_m, cut_m, source.executor());
+  // Candidates for walls, of which some are furniture
+  plan.walls = wall_sides(of.points, of.floor_m, of.cut_m, source.executor());
   drop_low_furniture(plan.walls);
-  std::vector<WallRaster> rasters = rasters_of(plan.walls, points, floor_m);
-  FreeSpace space(box_of(plan.walls), floor_m);
-
-  if (source.has_store()) {
-    auto seen = for_each_view(source, [&](const ViewRays& rays) -> core::Result<void> {
-      space.add(rays);
-      source.executor().parallel_for(rasters.size(), [&](std::size_t i) { rasters[i].add_rays(rays); });
-      return {};
-    });
-
-    if (!seen) return tl::unexpected(seen.error());
-    plan.rays_known = true;
+  std::vector<WallRaster> rasters = rasters_of(plan.walls, of.points, of.floor_m);
+  FreeSpace space(box_of(plan.walls), of.floor_m);
+  plan.rays_known = source.has_store();
+  if (plan.rays_known) {
+    if (auto seen = see_through_views(source, space, rasters); !seen) return tl::unexpected(seen.error());
   }
 
+  // Views decide between walls and furniture
   drop_furniture(plan.walls, rasters, plan.rays_known);
   drop_loose_sides(plan.walls, rasters);
-  constexpr double kLintel_m = 2.0;
-  const Cut cut{cut_m, std::max(0.25, cut_m - 0.3),
-                std::clamp(cut_m + 0.3, 0.0, std::max(kLintel_m, cut_m + 0.1)), plan.rays_known};
-
+  const Cut cut = cut_at(of.cut_m, plan.rays_known);
   cut_sides(plan.walls, rasters, cut);
   if (plan.walls.empty()) return tl::unexpected(no_wall_error(source, **cloud));
 
-  join_corners(plan.walls);
-  for (std::size_t i = 0; i < plan.walls.size(); ++i)
-    plan.walls[i].openings = openings_between(rasters[i], plan.walls[i].s0, plan.walls[i].s1, cut);
-
-  std::vector<Fronts> fronts;
-  for (WallRaster& raster : rasters) {
-    const auto front = std::make_shared<const WallRaster>(std::move(raster));
-    fronts.push_back({front, front});
-  }
-
-  bridge_gaps(plan.walls, fronts, cut);
-  fit_sides(points, floor_m, source.executor(), plan.walls);
-  join_corners(plan.walls);
-  meet_hidden_walls(plan.walls);
-
-  for (WallLine& wall : plan.walls) {
-    drop_gaps_at_doors(wall);
-    for (auto* parts : {&wall.openings, &wall.gaps}) {
-      std::sort(parts->begin(), parts->end(),
-                [](const WallOpening& a, const WallOpening& b) { return a.s0 < b.s0; });
-    }
-  }
-
-  plan.doors = doors_of(plan.walls);
-  const std::vector<WallDoor> more = doors_between_sides(plan.walls, fronts, cut);
-  plan.doors.insert(plan.doors.end(), more.begin(), more.end());
-  find_far_sides(plan.walls, plan.doors);
-  measure_doors(points, floor_m, plan.doors);
-
+  // Doors are openings of whole walls, and rooms end at them
+  const std::vector<Fronts> fronts = join_sides(of, source.executor(), cut, rasters, plan.walls);
+  add_doors(of, fronts, cut, plan);
   if (plan.rays_known) {
-    std::vector<WallLine> closings = close_free_ends(points, floor_m, plan);
-    for (const WallDoor& door : plan.doors) {
-      WallDoor behind = door;
-      behind.jambs = door.far_jambs;
-      for (const WallDoor& side : {door, behind})
-        closings.push_back(to_next_walls(closing_of(side), plan.walls));
-    }
-
-    plan.rooms = rooms_in(box_of(plan.walls), plan.walls, closings, plan.doors, space);
+    add_open_rooms(of, space, plan);
   } else {
     plan.rooms = rooms_of(plan.walls);
   }
 
-  cut_walls_at(plan.doors, plan.walls);
-  find_leaves(points, floor_m, plan.walls, plan.doors);
-  const std::vector<WallDoor> windows = windows_of(points, floor_m, cut_m, plan.walls);
-  cut_walls_at(windows, plan.walls);
-  plan.doors.insert(plan.doors.end(), windows.begin(), windows.end());
-
-  set_thickness(plan.walls);
-  plan.furniture = furniture_outlines(points, floor_m, plan.walls);
-  measure_heights(points, floor_m, plan.rooms);
+  furnish_plan(of, plan);
   return moved(std::move(plan), Eigen::Matrix2d::Identity(), (*cloud)->shift.head<2>());
 }
 

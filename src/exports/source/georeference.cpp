@@ -25,6 +25,7 @@ int utm_epsg(double latitude, double longitude) {
   return (latitude < 0.0 ? 32700 : 32600) + zone;
 }
 
+/// Places the map by the position and heading of its origin, in the UTM zone there.
 core::Result<void> place_by_datum(const std::vector<double>& datum, const ProjFunctions& proj,
                                   Georeference& reference) {
   if (datum.size() != 3 || std::abs(datum[0]) > 84.0 || std::abs(datum[1]) > 180.0) {
@@ -37,6 +38,7 @@ core::Result<void> place_by_datum(const std::vector<double>& datum, const ProjFu
   return proj.place(datum[0], datum[1], datum[2], reference);
 }
 
+/// Places the map by coordinates of its origin in a projected system.
 core::Result<void> place_by_origin(const ExportOptions& options, const ProjFunctions& proj,
                                    Georeference& reference) {
   const std::vector<double>& origin = options.origin;
@@ -62,18 +64,22 @@ Eigen::Matrix3d Georeference::linear() const {
   return turned;
 }
 
+/// The georeference that the options ask for, if any; options that contradict each other are refused.
 core::Result<std::optional<Georeference>> georeference_of(const ExportOptions& options, core::Log& log) {
   const bool by_origin = options.epsg != 0 || !options.origin.empty();
   if (options.datum.empty() && !by_origin) return std::nullopt;
   if (!options.datum.empty() && by_origin)
     return core::usage_error("--datum and --epsg both say where the map lies; give one of them");
 
+  // The part "proj" knows coordinate systems
   const auto& proj = core::part<ProjFunctions>();
   if (!proj) return tl::unexpected(proj.error());
   Georeference reference;
   auto placed = by_origin ? place_by_origin(options, **proj, reference)
                           : place_by_datum(options.datum, **proj, reference);
   if (!placed) return tl::unexpected(placed.error());
+
+  // Swapped coordinates are a frequent mistake
   if (by_origin && !(*proj)->covers(reference)) {
     log.warning(fmt::format(
         "--origin {:.0f},{:.0f}: lies outside the area of use of EPSG:{} ({}); east comes first, then north",
@@ -82,6 +88,7 @@ core::Result<std::optional<Georeference>> georeference_of(const ExportOptions& o
   return reference;
 }
 
+/// The cloud in world coordinates; the shift takes whole metres, so that floats stay exact.
 cloud::CloudFile to_world(const cloud::CloudFile& file, const Georeference& reference) {
   cloud::CloudFile result = file;
   result.cloud = std::make_shared<cloud::Cloud>(*file.cloud);
@@ -93,6 +100,7 @@ cloud::CloudFile to_world(const cloud::CloudFile& file, const Georeference& refe
   const Eigen::Matrix3f turn =
       Eigen::AngleAxisd(reference.turn, Eigen::Vector3d::UnitZ()).toRotationMatrix().cast<float>();
 
+  // Normals are turned, but not scaled
   for (cloud::Point& p : *result.cloud) {
     p.getVector3fMap() = (linear * p.getVector3fMap().cast<double>() + rest).cast<float>();
     p.getNormalVector3fMap() = (turn * p.getNormalVector3fMap()).eval();
@@ -100,6 +108,7 @@ cloud::CloudFile to_world(const cloud::CloudFile& file, const Georeference& refe
   return result;
 }
 
+/// Writes the transform next to the export, for formats that cannot hold it.
 core::Result<void> write_georeference(const std::filesystem::path& file, const Georeference& reference) {
   nlohmann::ordered_json json;
   json["what"] = "world = origin + linear * map; metres";
@@ -109,6 +118,7 @@ core::Result<void> write_georeference(const std::filesystem::path& file, const G
   json["turn_degrees"] = reference.turn * 180.0 / M_PI;
   json["scale"] = reference.scale;
 
+  // Rows of the matrix
   const Eigen::Matrix3d linear = reference.linear();
   for (int row = 0; row < 3; ++row)
     json["linear"].push_back({linear(row, 0), linear(row, 1), linear(row, 2)});

@@ -101,11 +101,14 @@ geometry::Rigid3 upright_from_map(const cloud::Floor& floor, const geometry::Rig
 
 }  // namespace
 
+/// Heights of floors: peaks of the histogram of points that face up.
 std::vector<double> floor_heights(const cloud::Cloud& cloud) {
   constexpr double kBin_m = 0.05;
   constexpr double kStorey_m = 2.0;    // floors are further apart
   constexpr double kLeastShare = 0.2;  // of the widest one's surface
   constexpr float kLevel = 0.94F;      // 20 degrees
+
+  // Points of level surfaces by height
   std::map<long, std::size_t> bins;
   for (const cloud::Point& p : cloud) {
     if (p.getVector3fMap().allFinite() && p.normal_z > kLevel) ++bins[std::lround(p.z / kBin_m)];
@@ -114,6 +117,7 @@ std::vector<double> floor_heights(const cloud::Cloud& cloud) {
   std::size_t widest = 0;
   for (const auto& [bin, count] : bins) widest = std::max(widest, count);
 
+  // Wide peaks, a storey apart
   std::vector<double> floors;
   for (auto bin = bins.begin(); bin != bins.end(); ++bin) {
     const auto next = std::next(bin);
@@ -126,6 +130,7 @@ std::vector<double> floor_heights(const cloud::Cloud& cloud) {
   return floors;
 }
 
+/// Opens a map or a cloud, and checks the part of it that is selected.
 core::Result<MapSource> MapSource::open(const ExportRequest& request, const core::Executor& executor,
                                         core::Log& log, const ExportProgress& progress) {
   MapSource source;
@@ -150,6 +155,7 @@ core::Result<void> MapSource::open_cloud() {
   return {};
 }
 
+/// Opens a result, or a component of a run, with the store if it has one.
 core::Result<void> MapSource::open_map() {
   auto place = maps::find_map(request_->input);
   if (place) {
@@ -160,6 +166,7 @@ core::Result<void> MapSource::open_map() {
     return tl::unexpected(place.error());
   }
 
+  // Without a store only files of the result can be exported
   place_.robot = request_->robot;
   upright_ = place_.result.has_value();
   if (place_.store.empty()) return {};
@@ -167,6 +174,7 @@ core::Result<void> MapSource::open_map() {
   if (!stored) return tl::unexpected(stored.error());
   store_.emplace(std::move(*stored));
 
+  // A map of one robot lists that robot only
   const maps::StoredMap& map = store_->stored();
   world_from_map_ = map.result.output_from_map;
   upright_ = map.result.upright;
@@ -176,7 +184,7 @@ core::Result<void> MapSource::open_map() {
   return map.complete ? core::Result<void>{} : level_interrupted();
 }
 
-/// A run that was interrupted had no time to look for its floor.
+/// A run that was interrupted has not found its floor, so it is searched now.
 core::Result<void> MapSource::level_interrupted() {
   const auto frames = store_->trajectory();
   if (frames.empty()) {
@@ -184,6 +192,7 @@ core::Result<void> MapSource::level_interrupted() {
         fmt::format("{}: holds no frame yet; there is nothing to export", place_.store.string()));
   }
 
+  // The floor is searched in the fused cloud
   auto fused = store_->fused(store_->fusion_options(), *executor_);
   if (!fused) return tl::unexpected(fused.error());
 
@@ -191,6 +200,8 @@ core::Result<void> MapSource::level_interrupted() {
   file.cloud = std::move(fused->cloud);
   file.columns = std::move(fused->columns);
   file.has_color = file.has_normals = true;
+
+  // Cameras are held upright on average
   Eigen::Vector3d up = Eigen::Vector3d::Zero();
   for (const auto& pose : frames) up -= pose.world_from_camera.rotation.col(1);
 
@@ -200,6 +211,7 @@ core::Result<void> MapSource::level_interrupted() {
     cloud::transform(*file.cloud, world_from_map_);
   }
 
+  // The cloud is kept for the export
   whole_ = std::move(file);
   log_->info(
       fmt::format("{}: the run {}; {}", place_.store.string(),
@@ -208,6 +220,7 @@ core::Result<void> MapSource::level_interrupted() {
   return {};
 }
 
+/// Sets the box of what is exported; a storey also sets the floor.
 core::Result<void> MapSource::select() {
   constexpr double kAll = std::numeric_limits<double>::infinity();
   const ExportOptions& o = options();
@@ -220,6 +233,7 @@ core::Result<void> MapSource::select() {
                                     Eigen::Vector3d(o.box[3], o.box[4], o.box[5]));
   }
 
+  // Heights of --z count from the map's zero
   if (!o.z.empty()) {
     if (o.z.size() != 2 || o.z[0] >= o.z[1])
       return core::usage_error("--z: takes two heights, the lower first");
@@ -229,6 +243,7 @@ core::Result<void> MapSource::select() {
     floor_m_ = 0.0;
   }
 
+  // Storeys are found in an upright cloud
   if (o.storey < 0) return {};
   constexpr double kBelow_m = 0.2;  // points this far below belong to the storey's own floor
   if (auto up = need_upright("--storey"); !up) return up;
@@ -236,6 +251,7 @@ core::Result<void> MapSource::select() {
   const auto cloud = whole_cloud();
   if (!cloud) return tl::unexpected(cloud.error());
 
+  // Floors from the lowest to the highest
   std::vector<double> floors = floor_heights(*(*cloud)->cloud);
   for (double& floor : floors) floor += (*cloud)->shift.z();
   const auto wanted = static_cast<std::size_t>(o.storey);
@@ -244,6 +260,7 @@ core::Result<void> MapSource::select() {
                                          floors.size(), floors.size() == 1 ? " is" : "s are"));
   }
 
+  // From one floor to the next
   floor_m_ = floors[wanted];
   if (wanted > 0) selected_.min().z() = std::max(selected_.min().z(), floors[wanted] - kBelow_m);
   if (wanted + 1 < floors.size())
@@ -259,6 +276,7 @@ std::string MapSource::name() const {
   return core::printable(name);
 }
 
+/// The store, or an error that says why there is none.
 core::Result<const maps::StoredRun*> MapSource::store(const std::string& what) const {
   if (store_) return &*store_;
   if (is_component(place_)) {
@@ -294,6 +312,7 @@ std::string MapSource::frame_text() const {
   return frame_.known() ? frame_.comments().front() : "frame: the cloud's; its file does not say what is up";
 }
 
+/// The whole cloud, fused again if another voxel size is wanted.
 core::Result<cloud::CloudFile> MapSource::read_cloud() const {
   const double voxel_m = options().voxel_m;
   if (cloud_only_ || (voxel_m > 0.0 && !store_)) {
@@ -306,12 +325,14 @@ core::Result<cloud::CloudFile> MapSource::read_cloud() const {
     return file;
   }
 
+  // Another voxel size: fused again from the stored views
   if (voxel_m == 0.0) return maps::read_map_cloud(place_, *executor_);
   cloud::DenseFusionOptions fusion = store_->fusion_options();
   fusion.voxels.voxel_m = voxel_m;
   auto fused = store_->fused(fusion, *executor_);
   if (!fused) return tl::unexpected(fused.error());
 
+  // Fused clouds always have colours and normals
   cloud::CloudFile file;
   file.cloud = std::move(fused->cloud);
   file.columns = std::move(fused->columns);
@@ -319,6 +340,7 @@ core::Result<cloud::CloudFile> MapSource::read_cloud() const {
   return file;
 }
 
+/// The whole cloud, read again only if the voxel size has changed.
 core::Result<const cloud::CloudFile*> MapSource::whole_cloud() {
   if (!whole_ || whole_voxel_m_ != options().voxel_m) {
     auto file = read_cloud();
@@ -330,6 +352,7 @@ core::Result<const cloud::CloudFile*> MapSource::whole_cloud() {
   return &*whole_;
 }
 
+/// The selected points; the whole cloud is released afterwards.
 core::Result<const cloud::CloudFile*> MapSource::cloud() {
   if (chosen_) return &*chosen_;
   const auto whole = whole_cloud();
@@ -343,10 +366,13 @@ core::Result<const cloud::CloudFile*> MapSource::cloud() {
   return &*chosen_;
 }
 
+/// Poses of the store, with the keyframe of each frame that is one.
 core::Result<std::vector<ExportPose>> MapSource::stored_poses(bool keyframes_only) const {
   const maps::StoredMap& map = store_->stored();
   const maps::MapPoses poses = maps::poses_of(map.map, map.frames);
   const bool several = robots_.size() > 1;
+
+  // A single robot needs no name
   const auto name_of = [&](std::int32_t number) -> std::string {
     for (const maps::RobotInfo& robot : robots_) {
       if (several && robot.number == number) return robot.name;
@@ -354,6 +380,7 @@ core::Result<std::vector<ExportPose>> MapSource::stored_poses(bool keyframes_onl
     return "";
   };
 
+  // Keyframes by robot and stamp
   std::map<std::pair<std::int32_t, double>, core::KeyframeId> keyframes;
   std::vector<ExportPose> all;
   for (const maps::KeyframePose& keyframe : poses.keyframes) {
@@ -364,6 +391,7 @@ core::Result<std::vector<ExportPose>> MapSource::stored_poses(bool keyframes_onl
     }
   }
 
+  // A frame with a keyframe's stamp is that keyframe
   for (std::size_t i = 0; !keyframes_only && i < poses.trajectory.size(); ++i) {
     const geometry::StampedPose& pose = poses.trajectory[i];
     const std::int32_t robot = poses.trajectory_ids[i].robot;
@@ -375,6 +403,7 @@ core::Result<std::vector<ExportPose>> MapSource::stored_poses(bool keyframes_onl
   return all;
 }
 
+/// Poses from the text files of a result without a store.
 core::Result<std::vector<ExportPose>> MapSource::written_poses(bool keyframes_only) const {
   std::vector<ExportPose> all;
   const auto folders = place_.result->robot_folders();
@@ -390,6 +419,7 @@ core::Result<std::vector<ExportPose>> MapSource::written_poses(bool keyframes_on
   return all;
 }
 
+/// Selected poses, sorted by robot and stamp.
 core::Result<std::vector<ExportPose>> MapSource::poses(bool keyframes_only) const {
   if (cloud_only_) {
     return core::usage_error(

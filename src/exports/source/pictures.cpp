@@ -42,6 +42,7 @@ std::vector<RecordingName> recordings_of_run(const std::string& configuration,
 
 namespace {
 
+/// Recordings of the run, by robot; those that the user names replace what the run has recorded.
 core::Result<std::vector<RecordingName>> recordings_of(const MapSource& source,
                                                        const maps::StoredRun& store) {
   const maps::StoreHeader& header = store.stored().header;
@@ -50,12 +51,14 @@ core::Result<std::vector<RecordingName>> recordings_of(const MapSource& source,
   const std::vector<std::string>& given = source.request().recordings;
   if (given.empty() && names.size() == robots) return names;
 
+  // Live runs, for example, name no recording
   if (given.empty()) {
     return core::input_error(fmt::format(
         "{}: does not say from which recordings it was made; name them with --recording, one for each robot",
         source.request().input.string()));
   }
 
+  // Robots and recordings must match
   if (given.size() != robots) {
     return core::usage_error(
         fmt::format("--recording: {} given, the map is of {} robot{}; name one for each, in "
@@ -63,6 +66,7 @@ core::Result<std::vector<RecordingName>> recordings_of(const MapSource& source,
                     given.size(), robots, robots == 1 ? "" : "s"));
   }
 
+  // The user's names, with the cameras of the run
   names.resize(robots);
   for (std::size_t i = 0; i < robots; ++i) {
     names[i].input = given[i];
@@ -97,6 +101,7 @@ core::Result<std::vector<ExportPose>> sharpest_near(const MapSource& source,
   std::vector<double> best(keyframes.size(), -1.0);
   std::size_t at = 0;
 
+  // Frames and keyframes are sorted, so that one pass suffices
   for (std::size_t f = 0; f < frames.size(); ++f) {
     const ExportPose& frame = frames[f];
     const auto before = [&](std::size_t k) {
@@ -108,6 +113,7 @@ core::Result<std::vector<ExportPose>> sharpest_near(const MapSource& source,
                             : 1e300);
     };
 
+    // Frames near this keyframe only
     while (at + 1 < keyframes.size() && before(at)) ++at;
     source.progress(f, frames.size());
     const auto number = pictures.find(frame.robot, frame.stamp);
@@ -118,12 +124,14 @@ core::Result<std::vector<ExportPose>> sharpest_near(const MapSource& source,
     const auto picture = pictures.read(frame.robot, *number);
     if (!picture) continue;  // damaged: another one is chosen
 
+    // The sharpest so far
     const double sharp = sharpness(picture->gray);
     if (sharp <= best[at]) continue;
     best[at] = sharp;
     chosen[at] = frame;
   }
 
+  // Without a readable frame the keyframe stays
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     if (best[k] < 0.0) chosen[k] = keyframes[k];
   }
@@ -133,6 +141,7 @@ core::Result<std::vector<ExportPose>> sharpest_near(const MapSource& source,
 
 }  // namespace
 
+/// Pictures of the recordings, else those that the store holds.
 core::Result<Pictures> Pictures::open(const MapSource& source) {
   auto recordings = open_recordings(source);
   if (recordings || !source.has_store() || !source.request().recordings.empty()) return recordings;
@@ -142,6 +151,7 @@ core::Result<Pictures> Pictures::open(const MapSource& source) {
   return stored;
 }
 
+/// Pictures in the store, whose numbers are those of keyframes.
 Pictures Pictures::open_stored(const maps::StoredRun& store) {
   Pictures pictures;
   const auto ids = store.reader().whole_picture_ids();
@@ -154,16 +164,19 @@ Pictures Pictures::open_stored(const maps::StoredRun& store) {
                                                      static_cast<std::size_t>(id.index));
   }
 
+  // find() needs sorted stamps
   for (auto& [robot, recording] : pictures.by_robot_)
     std::sort(recording.stamps.begin(), recording.stamps.end());
   pictures.reader_ = &store.reader();
   return pictures;
 }
 
+/// Opens the recording of each robot, with its refined camera.
 core::Result<Pictures> Pictures::open_recordings(const MapSource& source) {
   const auto store = source.store("the cameras of pictures");
   if (!store) return tl::unexpected(store.error());
 
+  // Only the caller knows how recordings are opened
   const maps::StoreHeader& header = (*store)->stored().header;
   if (!source.request().open)
     return core::input_error("recordings cannot be opened here; pictures are left out");
@@ -171,6 +184,7 @@ core::Result<Pictures> Pictures::open_recordings(const MapSource& source) {
   const auto names = recordings_of(source, **store);
   if (!names) return tl::unexpected(names.error());
 
+  // One recording for each robot
   Pictures pictures;
   for (std::size_t i = 0; i < header.robots.size(); ++i) {
     const maps::RobotInfo& robot = header.robots[i];
@@ -178,10 +192,12 @@ core::Result<Pictures> Pictures::open_recordings(const MapSource& source) {
     auto opened = source.request().open((*names)[i]);
     if (!opened) return tl::unexpected(opened.error());
 
+    // Images as the refined camera would have taken them
     recording.given = std::move(*opened);
     if (!robot.versions.empty())
       recording.corrected = recording.given->taken_by(robot.versions.back().camera);
 
+    // find() needs sorted stamps
     for (std::size_t f = 0; f < recording.given->size(); ++f)
       recording.stamps.emplace_back(recording.given->info(f).stamp, f);
     std::sort(recording.stamps.begin(), recording.stamps.end());
@@ -191,6 +207,7 @@ core::Result<Pictures> Pictures::open_recordings(const MapSource& source) {
   return pictures;
 }
 
+/// The frame with this stamp, which text files may have rounded.
 std::optional<std::size_t> Pictures::find(std::int32_t robot, double stamp) const {
   constexpr double kSame_s = 5e-4;
   const auto recording = by_robot_.find(robot);
@@ -203,6 +220,7 @@ std::optional<std::size_t> Pictures::find(std::int32_t robot, double stamp) cons
 }
 
 core::Result<sensor::RgbdFrame> Pictures::read(std::int32_t robot, std::size_t frame) const {
+  // Stored pictures are JPEG, without depth
   if (stored()) {
     const auto bytes = reader_->whole_picture({robot, static_cast<std::int32_t>(frame)});
     if (!bytes) return tl::unexpected(bytes.error());
@@ -214,10 +232,12 @@ core::Result<sensor::RgbdFrame> Pictures::read(std::int32_t robot, std::size_t f
     return picture;
   }
 
+  // The refined camera, if it is known
   const Recording& recording = by_robot_.at(robot);
   return (recording.corrected ? *recording.corrected : *recording.given).read(frame);
 }
 
+/// Pictures, or nothing with a note that says why.
 std::unique_ptr<Pictures> open_pictures(const MapSource& source, ExportSummary& summary) {
   auto pictures = Pictures::open(source);
   if (pictures) return std::make_unique<Pictures>(std::move(*pictures));
@@ -228,11 +248,13 @@ std::unique_ptr<Pictures> open_pictures(const MapSource& source, ExportSummary& 
   return nullptr;
 }
 
+/// Poses to export with their pictures, named by robot and number.
 core::Result<std::vector<Picture>> pictures_of(const MapSource& source, const Pictures* pictures) {
   const ExportOptions& options = source.options();
   auto keyframes = source.poses(true);
   if (!keyframes) return tl::unexpected(keyframes.error());
 
+  // Frames replace or complete the keyframes
   std::vector<ExportPose> poses = *keyframes;
   if (options.sharpest || options.every > 0) {
     const auto frames = source.poses(false);
@@ -246,6 +268,7 @@ core::Result<std::vector<Picture>> pictures_of(const MapSource& source, const Pi
       poses = std::move(*chosen);
     }
 
+    // Every N-th frame
     for (std::size_t i = 0; options.every > 0 && i < frames->size();
          i += static_cast<std::size_t>(options.every))
       poses.push_back((*frames)[i]);
@@ -253,6 +276,7 @@ core::Result<std::vector<Picture>> pictures_of(const MapSource& source, const Pi
       return a.robot != b.robot ? a.robot < b.robot : a.stamp < b.stamp;
     };
 
+    // A keyframe may also be an N-th frame
     std::stable_sort(poses.begin(), poses.end(), earlier);
     const auto same = [](const ExportPose& a, const ExportPose& b) {
       return a.robot == b.robot && a.stamp == b.stamp;
@@ -260,11 +284,14 @@ core::Result<std::vector<Picture>> pictures_of(const MapSource& source, const Pi
     poses.erase(std::unique(poses.begin(), poses.end(), same), poses.end());
   }
 
+  // Numbers count by robot
   std::vector<Picture> all;
   std::map<std::int32_t, int> numbers;
   for (const ExportPose& pose : poses) {
     Picture picture;
     picture.pose = pose;
+
+    // Frames without a picture keep their pose
     const std::string number = fmt::format("{:06d}", ++numbers[pose.robot]);
     picture.name = pose.robot_name.empty() ? number : core::folder_name(pose.robot_name) + "_" + number;
     if (pictures != nullptr) picture.frame = pictures->find(pose.robot, pose.stamp);

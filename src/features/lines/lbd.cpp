@@ -74,6 +74,8 @@ Support support_of(const LineSegment& segment) {
   Support s;
   s.direction = segment.direction();
   s.normal = {-s.direction.y(), s.direction.x()};
+
+  // The gradient image has half the resolution
   s.middle = 0.5F * (segment.middle() - Eigen::Vector2f(0.5F, 0.5F));
   const float length = 0.5F * segment.length();
   s.columns = std::clamp(static_cast<int>(length / 4.0F) * 4, 4, kMaxColumns);
@@ -81,6 +83,7 @@ Support support_of(const LineSegment& segment) {
   return s;
 }
 
+// True if the whole support region is within the image.
 bool inside(const Support& s, const cv::Mat& gradient) {
   const float along = 0.5F * static_cast<float>(s.columns) * s.step;
   const float across = 0.5F * static_cast<float>(kRows) * kRowSpacing;
@@ -162,8 +165,9 @@ class RowSummer {
     cv::v_int32x4 along = cv::v_setzero_s32();
     cv::v_int32x4 along_abs = cv::v_setzero_s32();
     cv::v_int32x4 across = cv::v_setzero_s32();
-
     cv::v_int32x4 across_abs = cv::v_setzero_s32();
+
+    // Four columns at a time
     for (int k = 0; k < columns; k += 4) {
       const cv::v_int16x8 g = cv::v_reinterpret_as_s16(cv::v_load(row.data() + k));
       const cv::v_int32x4 a = cv::v_dotprod(g, along_);
@@ -174,6 +178,7 @@ class RowSummer {
       across_abs = across_abs + cv::v_reinterpret_as_s32(cv::v_abs(c));
     }
 
+    // Sums of the positive and of the negative parts
     const auto a = static_cast<float>(cv::v_reduce_sum(along));
     const auto a_abs = static_cast<float>(cv::v_reduce_sum(along_abs));
     const auto c = static_cast<float>(cv::v_reduce_sum(across));
@@ -186,6 +191,7 @@ class RowSummer {
   cv::v_int16x8 across_;
 };
 
+// Sums of the gradients in each row of the support region.
 RowSums row_sums(const cv::Mat& gradient, const LineSegment& segment) {
   const Support support = support_of(segment);
   const Sampler sampler(gradient, support);
@@ -212,6 +218,7 @@ BandStatistics band_statistics(const RowSums& sums, const Weights& weights) {
   std::array<std::array<float, 4>, kBands + 2> mean{};  // one more band at each side for samples outside
   std::array<std::array<float, 4>, kBands + 2> square{};
 
+  // A row counts for its band and both neighbours
   for (std::size_t row = 0; row < kRows; ++row) {
     for (std::size_t k = 0; k < 3; ++k) {
       const float weight = weights.value[row][k];
@@ -224,6 +231,7 @@ BandStatistics band_statistics(const RowSums& sums, const Weights& weights) {
     }
   }
 
+  // Mean and deviation; the outer bands have fewer rows
   std::array<float, 4 * kBands> means{};
   std::array<float, 4 * kBands> deviations{};
   for (std::size_t j = 0; j < kBands; ++j) {
@@ -235,6 +243,7 @@ BandStatistics band_statistics(const RowSums& sums, const Weights& weights) {
     }
   }
 
+  // Normalised, clipped and normalised again, against contrast
   normalise(means.data(), means.size());
   normalise(deviations.data(), deviations.size());
 
@@ -264,6 +273,8 @@ std::vector<BandStatistics> band_statistics(const cv::Mat& gray, const std::vect
   if (segments.empty()) return result;
   CV_Assert(gray.type() == CV_8UC1 && gray.cols >= 2 && gray.rows >= 2);
   static const Weights weights;
+
+  // One gradient image for all segments
   const cv::Mat gradient = gradients(gray);
   result.reserve(segments.size());
   for (const LineSegment& s : segments) result.push_back(band_statistics(row_sums(gradient, s), weights));
@@ -272,6 +283,8 @@ std::vector<BandStatistics> band_statistics(const cv::Mat& gray, const std::vect
 
 LineDescriptor binarise(const BandStatistics& statistics) {
   LineDescriptor bits{};
+
+  // Each bit: the statistic is larger in the first band
   for (std::size_t p = 0; p < kPairs.size(); ++p) {
     const float* a = statistics.data() + 8 * static_cast<std::size_t>(kPairs[p][0]);
     const float* b = statistics.data() + 8 * static_cast<std::size_t>(kPairs[p][1]);

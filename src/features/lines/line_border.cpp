@@ -19,6 +19,7 @@ bool constant(const cv::Mat& strip) {
   return high - low <= kMaxSpread;
 }
 
+// True if enough pixels differ visibly.
 bool visible_step(const cv::Mat& outside, const cv::Mat& inside, bool either_sign) {
   cv::Mat step;
   if (either_sign) {
@@ -52,7 +53,8 @@ cv::Rect valid_region(const cv::Mat& gray, int max_width) {
   cv::Rect whole(0, 0, gray.cols, gray.rows);
   if (gray.empty() || gray.cols < 16 || gray.rows < 16) return whole;
   CV_Assert(gray.type() == CV_8UC1);
-  // Side by side: the second pair looks only at what the first left, as a frame's corners belong to both.
+  // One pair of sides after the other: the second only gets the rest of the first, as a frame's corners
+  // belong to both.
   const int top = frame_width([&](int i) { return gray.row(i); }, max_width, gray.rows);
   const int bottom = frame_width([&](int i) { return gray.row(gray.rows - 1 - i); }, max_width, gray.rows);
   const cv::Mat rows = gray.rowRange(top, gray.rows - bottom);

@@ -58,6 +58,7 @@ double foreground_depth(const cv::Mat& depth, const Eigen::Vector2d& p, const Ei
   std::array<double, 2 * kMaxSide + 1> sorted{};
   const int side = std::min(options.side_px, kMaxSide);
 
+  // Depths across the line, in order and sorted
   std::size_t count = 0;
   for (int o = -side; o <= side; ++o) {
     const auto z = static_cast<double>(depth_at(depth, p.x() + o * normal.x(), p.y() + o * normal.y()));
@@ -94,6 +95,8 @@ std::vector<Sample> collect(const LineSegment& segment, const cv::Mat& depth, in
   const Eigen::Vector2d normal = Eigen::Vector2d(-along.y(), along.x()).normalized();
   std::vector<Sample> samples;
   samples.reserve(static_cast<std::size_t>(places));
+
+  // Foreground depth at places along the segment
   for (int i = 0; i < places; ++i) {
     const double s = (i + 0.5) / places;
     const double z = foreground_depth(depth, start + s * along, normal, options);
@@ -119,6 +122,7 @@ struct Columns {
   std::vector<double> s;
   std::vector<double> inverse;
   explicit Columns(const std::vector<Sample>& samples) {
+    // Padded with samples that no line explains
     const std::size_t size = (samples.size() + kAtATime - 1) / kAtATime * kAtATime;
     s.resize(size, 0.0);
     inverse.resize(size, std::numeric_limits<double>::infinity());
@@ -199,22 +203,26 @@ std::optional<Fit> least_squares(InverseDepth line, const std::vector<Sample>& s
     unsigned bins = 0;
     fit.inliers = 0;
 
+    // Normal equations in the inverse depth of both ends
     for (const Sample& q : samples) {
       if (!supports(line, q, gate)) continue;
       const double sigma = inverse_sigma(line.at(q.s));
       const Eigen::Vector2d basis = Eigen::Vector2d(1.0 - q.s, q.s) / sigma;
       information += basis * basis.transpose();
       vector += basis * (q.inverse / sigma);
+
       const double r = (q.inverse - line.at(q.s)) / sigma;
       chi2 += r * r;
       bins |= 1U << std::min(static_cast<int>(q.s * kCoverageBins), kCoverageBins - 1);
       ++fit.inliers;
     }
 
+    // Both ends must be constrained
     if (fit.inliers < 3 || !(information.determinant() > 1e-9 * information.trace() * information.trace())) {
       return std::nullopt;
     }
 
+    // The covariance grows with the residuals
     const Eigen::Vector2d solution = information.ldlt().solve(vector);
     line = {solution.x(), solution.y()};
     if (!(line.start > 0.0 && line.end > 0.0)) return std::nullopt;
@@ -263,11 +271,13 @@ std::optional<Line3> fit_line_depth(const LineSegment& segment, const cv::Mat& d
   const std::vector<Sample> samples = collect(segment, depth_m, places, options);
   if (static_cast<int>(samples.size()) < options.min_inliers) return std::nullopt;
 
+  // RANSAC, then least squares with its inliers
   const std::optional<InverseDepth> start = ransac(samples, options);
   if (!start) return std::nullopt;
   const std::optional<Fit> fit = least_squares(*start, samples, options.inlier_sigmas);
   if (!fit || !plausible(fit->line, options)) return std::nullopt;
 
+  // Enough of the segment must have depth
   Line3 line;
   const double inlier_share = static_cast<double>(fit->inliers) / static_cast<double>(samples.size());
   const double coverage = static_cast<double>(fit->bins) / std::min(kCoverageBins, places);
@@ -279,6 +289,7 @@ std::optional<Line3> fit_line_depth(const LineSegment& segment, const cv::Mat& d
   line.inlier_share = static_cast<float>(inlier_share);
   line.coverage = static_cast<float>(coverage);
 
+  // Ends on the rays of their pixels
   const Eigen::Vector3d start_ray = ray_of(segment.start, camera);
   const Eigen::Vector3d end_ray = ray_of(segment.end, camera);
   line.start = start_ray / fit->line.start;

@@ -66,6 +66,7 @@ std::vector<cv::Vec4f> run(const LineDetectorOptions& options, const cv::Mat& im
   return lines;
 }
 
+// True if a segment runs within the margin of a side.
 bool at_border(const LineSegment& s, const cv::Rect& region, const LineDetectorOptions& options) {
   const auto margin = static_cast<float>(options.border_px);
   const auto both_below = [&](float a, float b, float limit) {
@@ -116,12 +117,15 @@ std::vector<LineSegment> LineDetector::detect(const cv::Mat& gray) const {
   const auto min_length = static_cast<float>(options_.min_length_px);
   const float piece = options_.join ? static_cast<float>(kPieceShare) * min_length : min_length;
 
+  // Segments in pixels of the full image
   std::vector<LineSegment> segments;
   for (const cv::Vec4f& line :
        run(options_, detection_image(gray(region), options_), std::max(4.0F, piece / factor))) {
     LineSegment s;
     s.start = factor * Eigen::Vector2f(line[0], line[1]) + origin;
     s.end = factor * Eigen::Vector2f(line[2], line[3]) + origin;
+
+    // Long enough, away from the border, with a clear step
     if (!(s.length() >= piece) || at_border(s, region, options_)) continue;
     orient(s, gray);
     if (s.response >= kMinResponse) segments.push_back(s);
@@ -129,6 +133,7 @@ std::vector<LineSegment> LineDetector::detect(const cv::Mat& gray) const {
 
   if (options_.join) segments = join_collinear(std::move(segments), options_);
 
+  // Positions are refined at full resolution
   std::vector<LineSegment> kept;
   for (LineSegment& s : segments) {
     if (s.length() < min_length) continue;

@@ -11,7 +11,7 @@ namespace {
 constexpr float kDuplicateOffset = 1.0F;  // px: overlapping parallels nearer than this are one edge
 constexpr float kSameDirection = 0.8F;    // cosine; opposite steps are the two edges of a thin line
 
-// A segment with what the pairwise tests need again and again.
+// A segment with the quantities that the pairwise tests need.
 struct Piece {
   LineSegment segment;
   Eigen::Vector2f direction;
@@ -89,6 +89,8 @@ LineSegment merged(const LineSegment& a, const LineSegment& b) {
   const float la = a.length();
   const float lb = b.length();
   const Eigen::Vector2f centre = (la * a.middle() + lb * b.middle()) / (la + lb);
+
+  // Scatter of points spread evenly over both
   Eigen::Matrix2f scatter = Eigen::Matrix2f::Zero();
   for (const LineSegment* s : {&a, &b}) {
     const Eigen::Vector2f m = s->middle() - centre;
@@ -96,10 +98,12 @@ LineSegment merged(const LineSegment& a, const LineSegment& b) {
     scatter += s->length() * (m * m.transpose() + h * h.transpose() / 12.0F);
   }
 
+  // Principal direction, as the first segment points
   const float angle = 0.5F * std::atan2(2.0F * scatter(0, 1), scatter(0, 0) - scatter(1, 1));
   Eigen::Vector2f d(std::cos(angle), std::sin(angle));
   if (d.dot(a.end - a.start) < 0.0F) d = -d;
 
+  // Extent of all four ends along it
   float low = 0.0F;
   float high = 0.0F;
   for (const Eigen::Vector2f& p : {a.start, a.end, b.start, b.end}) {
@@ -131,6 +135,7 @@ std::vector<LineSegment> join_collinear(std::vector<LineSegment> segments,
   Glance glance(pieces);
   std::vector<char> gone(pieces.size(), 0);
 
+  // The first partner; blocks without one are skipped
   const auto partner_of = [&](std::size_t i) {
     for (std::size_t first = 0; first < pieces.size(); first += kAtATime) {
       const std::size_t last = std::min(pieces.size(), first + kAtATime);

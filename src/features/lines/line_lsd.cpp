@@ -110,6 +110,7 @@ Lsd::Lsd(const cv::Mat& image, float min_gradient, bool exact)
       gradients_[static_cast<std::size_t>(index)] = {static_cast<float>(gx) / norm,
                                                      static_cast<float>(gy) / norm, 0.5F * norm};
 
+      // Bins by magnitude, strongest first
       const int bin = kBins - 1 - std::min(kBins - 1, static_cast<int>(0.5F * kBinsPerLevel * norm));
       usable.push_back(index);
       bins.push_back(bin);
@@ -118,7 +119,7 @@ Lsd::Lsd(const cv::Mat& image, float min_gradient, bool exact)
   }
 
   for (std::size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
-  // In front of a white wall the faint edges are all there is, in a busy scene they only cost: whole bins are
+  // Faint edges are needed in front of a white wall, but only cost time in a busy scene: whole bins are
   // taken, strongest first, until the share is reached, but strong ones always.
   const auto strong = static_cast<std::size_t>(kBins - static_cast<int>(kStrongGradient * kBinsPerLevel));
 
@@ -127,6 +128,7 @@ Lsd::Lsd(const cv::Mat& image, float min_gradient, bool exact)
   while (last < kBins && first[last + 1] <= enough) ++last;
   seeds_.resize(static_cast<std::size_t>(first[last]));
 
+  // Counting sort; only these pixels may join regions
   for (std::size_t i = 0; i < usable.size(); ++i) {
     const auto bin = static_cast<std::size_t>(bins[i]);
     if (bin >= last) continue;
@@ -142,6 +144,7 @@ void Lsd::grow(int seed, float cosine) {
     float x, y;
   };
 
+  // The eight neighbours of a pixel
   const std::array<Step, 8> around = {{{-width_ - 1, -1.0F, -1.0F},
                                        {-width_, 0.0F, -1.0F},
                                        {-width_ + 1, 1.0F, -1.0F},
@@ -151,6 +154,7 @@ void Lsd::grow(int seed, float cosine) {
                                        {width_, 0.0F, 1.0F},
                                        {width_ + 1, 1.0F, 1.0F}}};
 
+  // The region begins with its seed
   region_.assign(1, pixel(seed));
   free_[static_cast<std::size_t>(seed)] = {};
   float sx = gradients_[static_cast<std::size_t>(seed)].x;
@@ -158,6 +162,7 @@ void Lsd::grow(int seed, float cosine) {
   float limit = cosine;  // cos(tolerance) |sum|
   Direction* const free = free_.data();
 
+  // Neighbours whose gradient agrees with the region's sum
   for (std::size_t i = 0; i < region_.size(); ++i) {
     const Pixel from = region_[i];
 
@@ -187,11 +192,12 @@ Rectangle Lsd::fit() const {
     centre += g * i.position();
   }
 
+  // Weighted second moments
   centre /= weight;
   float xx = 0.0F;
   float yy = 0.0F;
-
   float xy = 0.0F;
+
   for (const Pixel& i : region_) {
     const float g = gradients_[static_cast<std::size_t>(i.index)].magnitude;
     const Eigen::Vector2f p = i.position() - centre;
@@ -203,11 +209,13 @@ Rectangle Lsd::fit() const {
   const float angle = 0.5F * std::atan2(2.0F * xy, xx - yy);
   Eigen::Vector2f d(std::cos(angle), std::sin(angle));
   if (d.x() * sum_.y() - d.y() * sum_.x() > 0.0F) d = -d;  // darker side on the right
+
+  // Extent along and across the direction
   float low = 0.0F;
   float high = 0.0F;
   float left = 0.0F;
-
   float right = 0.0F;
+
   for (const Pixel& i : region_) {
     const Eigen::Vector2f p = i.position() - centre;
     const float along = d.dot(p);
@@ -250,6 +258,7 @@ bool Lsd::make_dense(Rectangle& rectangle) {
   const Pixel seed = region_.front();
   const float tolerance = tolerance_near_seed(rectangle.width);
 
+  // Grown again with the tolerance measured near the seed
   for (const Pixel& i : region_) give_back(i.index);
   grow(seed.index, std::cos(tolerance));
   if (region_.size() < 3) return false;
@@ -258,11 +267,13 @@ bool Lsd::make_dense(Rectangle& rectangle) {
   const Eigen::Vector2f middle = seed.position();
   float radius = std::max((rectangle.start - middle).norm(), (rectangle.end - middle).norm());
 
+  // Still too few points: a smaller radius
   while (density(rectangle) < kDensity) {
     radius *= kRadiusStep;
     const auto inside = [&](const Pixel& i) {
       return !((i.position() - middle).squaredNorm() > radius * radius);
     };
+
     const auto kept = std::stable_partition(region_.begin(), region_.end(), inside);
     for (auto i = kept; i != region_.end(); ++i) give_back(i->index);
     region_.erase(kept, region_.end());

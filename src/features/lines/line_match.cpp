@@ -22,6 +22,8 @@ struct Best {
   int index = -1;
   int first = 257;
   int second = 257;
+
+  // Keeps the best and the second best distance.
   void offer(int i, int distance) {
     if (distance < first) {
       second = first;
@@ -61,8 +63,9 @@ std::vector<LineMatch> match_lines(const std::vector<LineFeature>& a, const std:
   const std::vector<Shape> shapes_a = shapes(a);
   const std::vector<Shape> shapes_b = shapes(b);
   std::vector<Best> best_a(a.size());
-
   std::vector<Best> best_b(b.size());
+
+  // Best and second best, for both sides
   for (std::size_t i = 0; i < a.size(); ++i) {
     for (std::size_t j = 0; j < b.size(); ++j) {
       if (!alike(shapes_a[i], shapes_b[j])) continue;
@@ -72,6 +75,7 @@ std::vector<LineMatch> match_lines(const std::vector<LineFeature>& a, const std:
     }
   }
 
+  // Only good, unambiguous and mutual matches
   std::vector<LineMatch> matches;
   for (std::size_t i = 0; i < a.size(); ++i) {
     const Best& best = best_a[i];

@@ -32,6 +32,7 @@ struct OffsetFit {
 
 int samples_along(float length) { return std::clamp(static_cast<int>(length / 4.0F), 6, 20); }
 
+// Gaussian weights of a profile's samples.
 std::array<float, 2 * kProfileReach> window_weights() {
   std::array<float, 2 * kProfileReach> weights{};
   for (int i = 0; i < 2 * kProfileReach; ++i) {
@@ -54,6 +55,8 @@ void orient(LineSegment& segment, const cv::Mat& gray) {
     const Eigen::Vector2f right = p + 1.5F * normal;
     sum += bilinear(gray, left.x(), left.y()) - bilinear(gray, right.x(), right.y());
   }
+
+  // The darker side is on the right
   const float step = sum / (3.0F * static_cast<float>(n));
   if (step < 0.0F) std::swap(segment.start, segment.end);
   segment.response = std::abs(step);
@@ -94,6 +97,7 @@ void refine(LineSegment& segment, const cv::Mat& gray) {
       if (total > 0.5F) fit.add(2.0F * s - 1.0F, moment / sum, std::min(total, 20.0F));
     }
 
+    // Both ends move across the line
     float a = 0.0F;
     float b = 0.0F;
     if (!fit.solve(a, b) || std::abs(a) + std::abs(b) > static_cast<float>(kProfileReach)) return;

@@ -79,7 +79,7 @@ void fuse_into(maps::Map& map, const std::vector<PointId>& points, KeyframeId ke
                const sensor::Pinhole& camera, const FusionOptions& options, FusionSummary& summary) {
   const geometry::Rigid3& pose = map.camera_from_world(keyframe);
   const features::FrameFeatures& features = *map.keyframe(keyframe).features;
-  const auto matches = tracking::match_points(map, points, features, camera, pose, options.radius_px,
+  const auto matches = tracking::match_points(map, points, {features, camera, pose}, options.radius_px,
                                               options.association, nullptr);
 
   for (const tracking::PointMatch& m : matches) {

@@ -110,7 +110,7 @@ void fuse_into(maps::Map& map, const std::vector<LineId>& lines, KeyframeId keyf
   const sensor::Pinhole& camera = cameras.at(keyframe.robot);
   const geometry::Rigid3& pose = map.camera_from_world(keyframe);
   const features::FrameFeatures& features = *map.keyframe(keyframe).features;
-  const auto matches = tracking::match_lines(map, lines, features, camera, pose, options.radius_px,
+  const auto matches = tracking::match_lines(map, lines, {features, camera, pose}, options.radius_px,
                                              options.association, nullptr);
 
   for (const tracking::LineMatch& m : matches) {

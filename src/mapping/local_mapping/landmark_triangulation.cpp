@@ -178,8 +178,8 @@ std::optional<Meeting> meet(const maps::Map& map, const PairSearch& search, cons
   if (!rough) return std::nullopt;
 
   const Rigid3& pose = map.camera_from_world(newest.keyframe);
-  const auto at = tracking::align_observation(map, older, pose.inverse() * *rough, image->levels,
-                                              patch.middle, camera, pose, options.scale_factor);
+  const auto at = tracking::align_observation(
+      map, older, pose.inverse() * *rough, {image->levels, camera, pose, options.scale_factor}, patch.middle);
   if (!at) return alone();
 
   const Eigen::Vector2f shift = *at - patch.middle;

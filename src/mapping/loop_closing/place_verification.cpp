@@ -139,9 +139,9 @@ class Growth {
     const FrameFeatures& features = features_of(query_);
     visible_points.clear();
     visible_lines.clear();
-    points = tracking::match_points(*match_.map, points_, features, query_.camera, camera_from_world, radius,
-                                    association_, &visible_points);
-    lines = tracking::match_lines(*match_.map, lines_, features, query_.camera, camera_from_world, radius,
+    points = tracking::match_points(*match_.map, points_, {features, query_.camera, camera_from_world},
+                                    radius, association_, &visible_points);
+    lines = tracking::match_lines(*match_.map, lines_, {features, query_.camera, camera_from_world}, radius,
                                   association_, &visible_lines);
     problem.points = tracking::point_terms(*match_.map, points, features, association_);
     problem.lines = tracking::line_terms(*match_.map, lines, features, kLineSigma_px);

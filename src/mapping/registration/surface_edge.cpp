@@ -98,7 +98,7 @@ std::optional<maps::SurfaceEdge> align_surface_edge(const maps::Keyframe& a, cor
     }
 
     problem.planes =
-        tracking::associate_surface(surface, depth_of_b, camera, pose, depth_from_camera, association);
+        tracking::associate_surface(surface, {depth_of_b, camera, pose, depth_from_camera}, association);
     summary = optimize::solve_pose(problem, pose, solver);
 
     if (problem.photometric &&

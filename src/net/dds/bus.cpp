@@ -97,6 +97,7 @@ class Participant {
   }
 
   core::Result<void> open(const NetworkOptions& options, bool hub) {
+    // Domain and participant, secured if keys are given
     lingers_ = options.transport == Transport::kTcp;
     const auto id = static_cast<dds_domainid_t>(options.domain);
     domain_ = Entity(dds_create_domain(id, domain_configuration(options, hub).c_str()));
@@ -104,18 +105,21 @@ class Participant {
     if (!qos) return tl::unexpected(qos.error());
     if (domain_.handle > 0) participant_ = Entity(dds_create_participant(id, qos->get(), nullptr));
 
+    // Other participants are counted, of any kind
     if (participant_.handle > 0) {
       waitset_ = dds_create_waitset(participant_.handle);
       others_ = dds_create_reader(participant_.handle, DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr);
       return {};
     }
 
+    // Wrong keys are the likeliest failure
     const std::string error = first_error_->text();
     if (!options.security.empty() && !error.empty()) {
       return core::usage_error(
           fmt::format("--security: the keys in {} cannot be used: {}", options.security.string(), error));
     }
 
+    // Another program may hold the port
     const dds_return_t code = domain_.handle <= 0 ? domain_.handle : participant_.handle;
     return core::usage_error(
         fmt::format("the network cannot be used on interface {}, domain {} ({}); another program may have "
@@ -142,6 +146,7 @@ class Participant {
     dds_attach_t first = 0;
     dds_waitset_wait(waitset_, &first, 1, DDS_MSECS(most.count()));
   }
+  /// Participants that are alive, without this one.
   [[nodiscard]] int others() const {
     constexpr std::size_t kMost = 256;
     std::vector<void*> samples(kMost, nullptr);
@@ -204,6 +209,7 @@ dds_return_t write_message(dds_entity_t writer, const Message& message) {
 class CycloneRobot : public RobotBus {
  public:
   explicit CycloneRobot(const BusLog& log) : participant_(log) {}
+  /// A robot publishes and subscribes in its own partition only.
   core::Result<void> open(const NetworkOptions& options, const std::string& name) {
     if (auto opened = participant_.open(options, false); !opened) return opened;
     publisher_ = participant_.publisher({name});
@@ -255,6 +261,7 @@ class CycloneRobot : public RobotBus {
 class CycloneHub : public HubBus {
  public:
   explicit CycloneHub(const BusLog& log) : participant_(log) {}
+  /// The hub receives from all robots, and from other hubs.
   core::Result<void> open(const NetworkOptions& options) {
     if (auto opened = participant_.open(options, true); !opened) return opened;
     publisher_ = participant_.publisher({kEverybody, kHubs});
@@ -275,6 +282,7 @@ class CycloneHub : public HubBus {
   void publish(const HubStatus& status) override {
     write_message<plumbline_wire_HubStatus>(statuses_, status);
   }
+  /// Statuses with the partition in which they were sent.
   std::vector<ReceivedStatus> poll_robots() override {
     std::vector<ReceivedStatus> received;
     take_some<plumbline_wire_RobotStatus>(
@@ -287,6 +295,7 @@ class CycloneHub : public HubBus {
   std::vector<HubStatus> poll_hubs() override {
     return take_all<plumbline_wire_HubStatus>(hub_reader_, kMaxStatuses);
   }
+  /// Chunks come from the robot's partition, feedback goes there.
   core::Result<void> subscribe(const std::string& robot) override {
     if (robots_.count(robot) != 0) return {};
     Robot entities;
@@ -307,6 +316,7 @@ class CycloneHub : public HubBus {
     return found == robots_.end() ? std::vector<Chunk>()
                                   : take_all<plumbline_wire_Chunk>(found->second.chunks, most);
   }
+  /// Changes whenever a reader joins, so that a new one is noticed.
   int feedback_subscriptions(const std::string& robot) override {
     const auto found = robots_.find(robot);
     dds_publication_matched_status_t status;

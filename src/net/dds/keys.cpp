@@ -66,6 +66,7 @@ void make_folder(const fs::path& folder) {
          folder.string() + ": cannot be made; check folder and permissions");
 }
 
+/// Reads one PEM file; a damaged one is an error.
 template <typename Thing, typename Read>
 Thing read_pem(const fs::path& file, const Read& read) {
   const Bio in(BIO_new_file(file.c_str(), "r"));
@@ -101,6 +102,7 @@ Key new_key() {
   return key;
 }
 
+/// A certificate with a random positive number, valid since yesterday.
 Certificate new_certificate(EVP_PKEY* key, const std::string& name, long days) {
   Certificate certificate(X509_new());
   X509_set_version(certificate.get(), 2);
@@ -117,6 +119,7 @@ Certificate new_certificate(EVP_PKEY* key, const std::string& name, long days) {
   return certificate;
 }
 
+/// The extension as text, as in OpenSSL's configuration.
 void add_extension(X509* certificate, X509* issuer, int what, const char* value) {
   X509V3_CTX context;
   X509V3_set_ctx(&context, issuer, certificate, nullptr, nullptr, 0);
@@ -156,6 +159,7 @@ const char* const kHead =
     "xsi:noNamespaceSchemaLocation=\"http://www.omg.org/spec/DDS-SECURITY/20170901/omg_shared_ca_{}.xsd\">\n";
 const char* const kDomains = "<domains><id_range><min>0</min><max>230</max></id_range></domains>\n";
 
+/// DDS Security's rules: everything is encrypted, nobody takes part without a certificate.
 std::string governance() {
   return fmt::format(fmt::runtime(kHead), "governance") + "<domain_access_rules><domain_rule>\n" + kDomains +
          "<allow_unauthenticated_participants>false</allow_unauthenticated_participants>\n"
@@ -173,6 +177,7 @@ std::string governance() {
          "</topic_rule></topic_access_rules></domain_rule></domain_access_rules></dds>\n";
 }
 
+/// One rule of the permissions.
 std::string allow(const char* what, const std::vector<std::string>& topics,
                   const std::vector<std::string>& partitions) {
   std::string xml = fmt::format("<{}><topics>", what);
@@ -203,6 +208,7 @@ std::string permissions(const std::string& name) {
   return xml + "</allow_rule><default>DENY</default></grant></permissions></dds>\n";
 }
 
+/// The list of revoked certificates, copied to every folder of keys.
 void write_crl(const fs::path& folder, const Authority& authority, X509_CRL* crl) {
   X509_CRL_set_version(crl, 1);
   X509_CRL_set_issuer_name(crl, X509_get_subject_name(authority.certificate.get()));
@@ -222,6 +228,7 @@ void write_crl(const fs::path& folder, const Authority& authority, X509_CRL* crl
   }
 }
 
+/// Failures of OpenSSL and of files become results.
 template <typename Action>
 core::Result<void> guarded(core::ErrorKind kind, const Action& action) {
   try {
@@ -236,6 +243,7 @@ core::Result<void> guarded(core::ErrorKind kind, const Action& action) {
 
 }  // namespace
 
+/// A certificate authority with an empty list of revoked keys.
 core::Result<void> make_authority(const fs::path& folder) {
   return guarded(core::ErrorKind::kOutput, [&] {
     make_folder(folder);
@@ -255,6 +263,7 @@ core::Result<void> make_authority(const fs::path& folder) {
   });
 }
 
+/// Key, certificate and signed permissions in a folder of that name.
 core::Result<void> make_keys(const fs::path& folder, const std::string& name) {
   return guarded(core::ErrorKind::kOutput, [&] {
     const Authority authority = read_authority(folder);
@@ -275,6 +284,7 @@ core::Result<void> make_keys(const fs::path& folder, const std::string& name) {
   });
 }
 
+/// Adds certificates to the revocation list.
 core::Result<void> revoke(const fs::path& folder, const std::vector<std::string>& names) {
   return guarded(core::ErrorKind::kUsage, [&] {
     const Authority authority = read_authority(folder);
@@ -292,6 +302,7 @@ core::Result<void> revoke(const fs::path& folder, const std::vector<std::string>
   });
 }
 
+/// Days until the certificate expires; negative afterwards.
 core::Result<int> days_left(const fs::path& folder) {
   int days = 0;  // towards 0: none on the first day after the certificate expired
   bool past = false;

@@ -55,15 +55,18 @@ Qos chunk_qos(int most_ms) {
 }
 
 core::Result<Qos> participant_qos(const NetworkOptions& options) {
+  // Without keys nothing is secured
   Qos qos = new_qos();
   if (options.security.empty()) return qos;
 
+  // Paths must not depend on the working directory
   std::error_code ec;
   const std::filesystem::path folder = std::filesystem::absolute(options.security);
   const auto set = [&](const char* name, const std::string& value) {
     dds_qset_prop(qos.get(), name, value.c_str());
   };
 
+  // Identity and permissions, as files
   for (const auto& [name, file] : {std::pair{"dds.sec.auth.identity_ca", kAuthorityFile},
                                    {"dds.sec.auth.identity_certificate", kCertificateFile},
                                    {"dds.sec.auth.private_key", kKeyFile},
@@ -71,6 +74,7 @@ core::Result<Qos> participant_qos(const NetworkOptions& options) {
                                    {"dds.sec.access.permissions_ca", kAuthorityFile},
                                    {"dds.sec.access.governance", kGovernanceFile},
                                    {"dds.sec.access.permissions", kPermissionsFile}}) {
+    // A missing file is named in the message
     if (!std::filesystem::exists(folder / file, ec)) {
       return core::usage_error(fmt::format(
           "--security: {} is missing; give a robot's or the hub's folder made by plumbline keys create",
@@ -79,6 +83,7 @@ core::Result<Qos> participant_qos(const NetworkOptions& options) {
     set(name, "file:" + (folder / file).string());
   }
 
+  // Plugins of Cyclone DDS, by absolute path
   for (const auto& [plugin, library, function] : {std::tuple{"auth", "auth", "authentication"},
                                                   {"access", "ac", "access_control"},
                                                   {"crypto", "crypto", "crypto"}}) {
@@ -87,11 +92,11 @@ core::Result<Qos> participant_qos(const NetworkOptions& options) {
     set((head + "init").c_str(), fmt::format("init_{}", function));
     set((head + "finalize").c_str(), fmt::format("finalize_{}", function));
   }
-
   return qos;
 }
 
 std::string domain_configuration(const NetworkOptions& options, bool hub) {
+  // Peers are named where multicast is missing
   const bool tcp = options.transport == Transport::kTcp;
   const bool local = options.interface == "lo";
   std::string peers;

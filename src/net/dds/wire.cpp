@@ -59,29 +59,35 @@ void convert_robot_status(const From& from, To& to) {
 
 template <typename From, typename To>
 void convert_hub_status(const From& from, To& to) {
+  // Versions and identity of the hub
   convert(from.protocol, to.protocol);
   convert(from.store_format, to.store_format);
   convert(from.program, to.program);
   convert(from.hub, to.hub);
   convert(from.up_s, to.up_s);
+
+  // The robot's run and the answer to it
   convert(from.robot, to.robot);
   convert(from.run, to.run);
   convert(from.incarnation, to.incarnation);
   convert(from.answer, to.answer);
   convert(from.problem, to.problem);
 
+  // The last transactions and chunks received
   convert(from.map_held, to.map_held);
   convert(from.clouds_held, to.clouds_held);
   convert(from.incoming, to.incoming);
   convert(from.checksum, to.checksum);
   convert(from.chunks, to.chunks);
 
+  // The common frame of all robots
   convert(from.frame.frame_of, to.frame.frame_of);
   convert(from.frame.frame_from_robot, to.frame.frame_from_robot);
   convert(from.frame.frame_from_camera, to.frame.frame_from_camera);
   convert(from.frame.covariance, to.frame.covariance);
 }
 
+/// One list of fields serves both directions.
 template <typename From, typename To>
 void convert_chunk(const From& from, To& to) {
   convert(from.protocol, to.protocol);

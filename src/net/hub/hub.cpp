@@ -31,6 +31,7 @@ namespace fs = std::filesystem;
 class LogFile : public core::Log {
  public:
   LogFile(const fs::path& file, core::Log& next) : file_(file, std::ios::app), next_(next) {}
+  /// Also to the hub's file, with the time.
   void write(core::LogLevel level, const std::string& message) override {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -63,6 +64,7 @@ core::Result<void> move_all(const fs::path& from, const fs::path& to) {
   return {};
 }
 
+/// Traffic of each robot, as in summary.json.
 nlohmann::json json_of(const std::vector<RobotTraffic>& traffic) {
   nlohmann::json robots = nlohmann::json::object();
   for (const RobotTraffic& t : traffic) {
@@ -77,8 +79,8 @@ nlohmann::json json_of(const std::vector<RobotTraffic>& traffic) {
   return robots;
 }
 
-/// Adds the network's traffic, the meetings and what the network's part in them makes doubtful to the summary
-/// of the fusion.
+/// Adds the network's traffic, the meetings and the reason for doubt, if there is one, to the summary of the
+/// fusion.
 core::Result<void> add_network(const fs::path& file, const std::vector<RobotTraffic>& traffic,
                                const std::vector<pipeline::Meeting>& meetings, const std::string& reason) {
   auto read = core::read_json(file);
@@ -140,20 +142,29 @@ core::Result<std::unique_ptr<HubBus>> open_logged_bus(const NetworkOptions& opti
   });
 }
 
-/// Fuses the received maps in `folder`; the summary's `reason` says why the result may not be trusted.
-core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, const fs::path& folder,
-                                                  const HubServer::Collected& collected,
-                                                  const HubMeetings& meetings, const core::Executor& executor,
-                                                  core::Log& log, const pipeline::Progress& progress) {
+/// The data of all robots, in the hub's folder.
+struct Received {
+  const fs::path& folder;
+  const HubServer::Collected& collected;
+  const HubMeetings& meetings;
+};
+
+/// Fuses the received maps; the summary's `reason` says why the result may not be trusted.
+core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, const Received& received,
+                                                  const core::Executor& executor, core::Log& log,
+                                                  const pipeline::Progress& progress) {
+  // Result in a folder below the received data
+  const fs::path& folder = received.folder;
   std::string reason;
   pipeline::FuseRequest last = request.fuse;
-  last.maps = received_maps(folder, collected, request.robots, reason);
+  last.maps = received_maps(folder, received.collected, request.robots, reason);
   last.output = folder / "fused";
   last.replace = true;
   // A run that was killed while it moved these has left some of them.
   if (auto removed = core::remove_own_files(last.output, maps::result_kind().files); !removed)
     return tl::unexpected(removed.error());
 
+  // Without a map there is no result
   const auto fuse = [&]() -> core::Result<pipeline::RunSummary> {
     if (!last.maps.empty()) {
       return pipeline::fuse_stored_maps(last, executor, log, core::StopToken(), progress);
@@ -169,9 +180,11 @@ core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, con
   if (!summary && leave_out_damaged(last.maps, executor, log, reason)) summary = fuse();
   if (!summary) return tl::unexpected(summary.error());
 
+  // The result moves into the hub's folder
   if (!reason.empty()) add_reason(reason, summary->reason);
   if (auto moved = move_all(last.output, folder); !moved) return tl::unexpected(moved.error());
-  if (auto added = add_network(folder / "summary.json", collected.traffic, meetings.meetings(), reason);
+  if (auto added = add_network(folder / "summary.json", received.collected.traffic,
+                               received.meetings.meetings(), reason);
       !added) {
     return tl::unexpected(added.error());
   }
@@ -183,6 +196,7 @@ core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, con
 core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core::Executor& executor,
                                            core::Log& console, const core::StopToken& stop,
                                            const Status& status, const pipeline::Progress& progress) {
+  // Received data stay even if the hub fails
   const auto options = checked(request.network, true);
   if (!options) return tl::unexpected(options.error());
   auto output = maps::OutputFolder::prepare(request.fuse.output, request.fuse.replace, request.resume);
@@ -190,12 +204,14 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
   output->keep();
   const fs::path folder = output->path();
 
+  // The log is kept with the data
   LogFile log(folder / "hub.log", console);
   if (auto secure = warn_of_security(*options, "anybody on it can read maps and send data", log); !secure)
     return tl::unexpected(secure.error());
   auto bus = open_logged_bus(*options, log);
   if (!bus) return tl::unexpected(bus.error());
 
+  // Two hubs would answer the same robots
   auto server = HubServer::open(folder, request, std::move(*bus), executor, log);
   if (!server) return tl::unexpected(server.error());
   if (auto alone = (*server)->look_for_others(stop); !alone) return tl::unexpected(alone.error());
@@ -204,13 +220,17 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
                                           : "robots; press Ctrl-C to fuse what was received",
                        options->interface, options->domain));
 
+  // Until all robots are done or the user stops
   (*server)->serve(stop, status);
   const HubServer::Collected collected = (*server)->close();
 
+  // Robots receive their final status during the fusion
   const core::SideThread farewell([&](const core::StopToken& enough) {
     (*server)->publisher().publish_final(collected.final_statuses, enough);
   });
-  auto summary = fuse_collected(request, folder, collected, (*server)->meetings(), executor, log, progress);
+  auto summary = fuse_collected(request, {folder, collected, (*server)->meetings()}, executor, log, progress);
+
+  // A failed fusion keeps the received data
   if (!summary) {
     core::Error error = output->explained(summary.error());
     if (error.kind == core::ErrorKind::kOutput)

@@ -17,6 +17,7 @@ constexpr auto kCheckEvery = 2s;
 /// Selects the next transaction of a robot that shares a frame with this one.
 void HubFeedback::select(Subscriber& to, const std::string& robot,
                          const std::map<std::string, RobotSession>& robots, const HubMeetings& meetings) {
+  // Only robots whose common frame is known
   const std::string frame = meetings.frame(robot).frame_of;
   for (const auto& [name, other] : robots) {
     if (frame.empty() || name == robot || meetings.frame(name).frame_of != frame) continue;
@@ -25,9 +26,9 @@ void HubFeedback::select(Subscriber& to, const std::string& robot,
     if (head < sent) sent = 0;  // the copy was emptied
     if (head == sent) continue;
 
+    // One transaction at a time
     auto next = maps::next_transaction(other.file(), maps::StoreStream::kMap, sent);
     if (!next || !*next) continue;
-
     const std::int64_t number = (*next)->number;
     to.source = name;
     to.transaction.emplace(maps::StoreStream::kMap, std::exchange(sent, number), std::move(**next));
@@ -40,6 +41,7 @@ void HubFeedback::select(Subscriber& to, const std::string& robot,
 
 void HubFeedback::step(const std::map<std::string, RobotSession>& robots, const HubMeetings& meetings,
                        HubBus& bus) {
+  // A new reader begins with the first transaction
   for (const auto& [name, robot] : robots) {
     Subscriber& to = subscribers_[name];
     const int subscriptions = bus.feedback_subscriptions(name);
@@ -47,6 +49,7 @@ void HubFeedback::step(const std::map<std::string, RobotSession>& robots, const 
     to.subscriptions = subscriptions;
     if (subscriptions == 0) continue;
 
+    // A full queue continues at the next step
     while (to.transaction && to.index < to.transaction->count()) {
       Chunk chunk = to.transaction->chunk(to.index);
       chunk.name = to.source;
@@ -54,6 +57,7 @@ void HubFeedback::step(const std::map<std::string, RobotSession>& robots, const 
       ++to.index;
     }
 
+    // The next transaction waits for the last chunk
     const bool sent = !to.transaction || to.index == to.transaction->count();
     if (sent && Clock::now() >= to.next) select(to, name, robots, meetings);
   }

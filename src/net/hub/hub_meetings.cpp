@@ -17,6 +17,7 @@ void put_pose(const geometry::Rigid3& pose, std::array<double, 7>& to) {
   to = {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()};
 }
 
+/// The robot's frame in the anchor's, with the upper triangle of the covariance.
 SharedFrame shared_frame(const mapping::RobotPlace& from, const std::string& frame_of) {
   SharedFrame frame;
   frame.frame_of = frame_of;
@@ -74,17 +75,20 @@ void HubMeetings::search(const std::string& robot, const maps::MapFollower& copy
 
 /// Adds the keyframes of a robot's map that are new. Returns how many.
 int HubMeetings::add(const std::string& robot, const maps::StoredMap& stored) {
+  // Only maps of a single robot take part
   Robot& known = robots_[robot];
   const std::vector<core::KeyframeId> ids = stored.map.keyframe_ids();
   const auto of_others = [](core::KeyframeId id) { return id.robot != 0; };
   if (ids.empty() || std::any_of(ids.begin(), ids.end(), of_others)) return 0;  // a map of several robots
 
+  // Robots are numbered as they come
   if (!known.number) {
     const auto next = static_cast<std::int32_t>(names_.size());
     known.number = server_->join({{next, maps::camera_of(stored.header.robots, 0).color}});
     names_.push_back(robot);
   }
 
+  // Every new keyframe is searched in the others' maps
   const auto number = static_cast<std::int32_t>(*known.number);
   const auto map = std::make_shared<maps::Map>(maps::renumbered(stored.map, {{0, number}}));
   int added = 0;
@@ -98,13 +102,16 @@ int HubMeetings::add(const std::string& robot, const maps::StoredMap& stored) {
   return added;
 }
 
+/// Searches in the background; true if one has been reported.
 bool HubMeetings::step(const std::map<std::string, RobotSession>& robots) {
+  // One search at a time
   if (job_.valid()) {
     if (!job_.ready()) return false;
     report();
     return true;
   }
 
+  // Copies of the maps that changed
   std::vector<std::pair<std::string, maps::MapFollower>> copies;
   for (const std::string& name : std::exchange(changed_, {})) {
     const auto session = robots.find(name);
@@ -112,12 +119,14 @@ bool HubMeetings::step(const std::map<std::string, RobotSession>& robots) {
   }
   if (copies.empty()) return false;
 
+  // The search runs while the hub serves
   job_ = executor_->submit([this, copies = std::make_shared<decltype(copies)>(std::move(copies))] {
     for (const auto& [robot, copy] : *copies) search(robot, copy);
   });
   return false;
 }
 
+/// Logs what the search found and updates the common frames.
 void HubMeetings::report() {
   job_.wait();
   for (const std::string& line : std::exchange(work_.lines, {})) log_->debug(line);

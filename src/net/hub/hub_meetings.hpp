@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Finds robots that meet while they map, from the copies of their maps. The work is a job beside the hub's
-// thread: a commit never waits for it. A hub that is resumed searches the copies again.
+// Finds robots that meet while they map, from the copies of their maps. The work is a job in parallel
+// to the hub's thread: a commit never waits for it. A hub that is resumed searches the copies again.
 #include <filesystem>
 #include <map>
 #include <memory>

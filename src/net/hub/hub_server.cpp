@@ -29,6 +29,7 @@ std::string key_of(const std::string& robot, const char* what) {
 
 }  // namespace
 
+/// Opens the folder with all robots that are known from before.
 core::Result<std::unique_ptr<HubServer>> HubServer::open(const std::filesystem::path& folder,
                                                          const HubRequest& request,
                                                          std::unique_ptr<HubBus> bus,
@@ -39,12 +40,14 @@ core::Result<std::unique_ptr<HubServer>> HubServer::open(const std::filesystem::
 }
 
 core::Result<void> HubServer::load_ledger() {
+  // The hub keeps its identity across restarts
   const auto known = ledger().all();
   if (!known) return tl::unexpected(known.error());
   std::map<std::string, std::string> texts = *known;
   publisher_.set_id(texts["hub"].empty() ? request_.fresh_id : texts["hub"]);
   if (auto put = ledger().put({{"hub", publisher_.id()}}); !put) return put;
 
+  // Robots of the ledger, with their copies
   for (const auto& [key, run] : *known) {
     constexpr std::size_t kAround = 10;  // length of "robot/" and "/run"
     RobotStatus robot;
@@ -53,11 +56,14 @@ core::Result<void> HubServer::load_ledger() {
     robot.run = run;
     robot.incarnation = std::strtoull(texts[key_of(robot.name, "incarnation")].c_str(), nullptr, 10);
 
+    // A robot that was done stays done
     const auto session = open_session(robot);
     if (!session) return tl::unexpected(session.error());
     (*session)->done = texts[key_of(robot.name, "state")] == kDone;
     const std::size_t keyframes = (*session)->copy().keyframes();
     log_.info(fmt::format("{}: {} keyframes are here from before", robot.name, keyframes));
+
+    // Known keyframes may already meet others
     if (keyframes > 0) meetings_.mark_changed(robot.name);
   }
   return {};
@@ -81,6 +87,7 @@ core::Result<void> HubServer::look_for_others(const core::StopToken& stop) {
   const auto until = Clock::now() + kLookForOthers;
   std::vector<ReceivedStatus> early;  // received meanwhile: unread ones would end each wait at once
 
+  // Statuses of robots are kept for later
   while (Clock::now() < until && !stop.stop_requested()) {
     publisher_.publish_presence();
     bus_->wait(kWait);
@@ -97,6 +104,7 @@ core::Result<void> HubServer::look_for_others(const core::StopToken& stop) {
     }
   }
 
+  // The search is over: answer the robots
   publisher_.serve();
   for (const ReceivedStatus& received : early) receive_status(received);
   return {};
@@ -107,11 +115,13 @@ void HubServer::report_once(const std::string& message) {
 }
 
 std::string HubServer::refusal(const RobotStatus& robot) const {
+  // Versions must agree
   if (robot.protocol != kProtocol || robot.store_format != maps::kStoreFormat) {
     return fmt::format("{} runs Plumbline {}, the hub {}: use the same version on both", robot.name,
                        robot.program, core::version());
   }
 
+  // A new robot needs a free place
   const auto known = robots_.find(robot.name);
   if (known == robots_.end()) {
     const std::size_t most = request_.robots > 0 ? request_.robots : kMaxRobots;
@@ -122,16 +132,17 @@ std::string HubServer::refusal(const RobotStatus& robot) const {
                        robot.name, most, names);
   }
 
+  // A name belongs to one run
   if (known->second.robot.run != robot.run) {
     return fmt::format(
         "{}: the hub has another run of that name; give this one another --name, or start the hub without "
         "--resume in another folder",
         robot.name);
   }
-
   return {};
 }
 
+/// Admits the robot or tells it why not.
 void HubServer::receive_status(const ReceivedStatus& received) {
   const RobotStatus& robot = received.status;
   if (!is_robot_name(robot.name)) return report_once("a robot with an invalid name is ignored");
@@ -153,6 +164,7 @@ void HubServer::receive_status(const ReceivedStatus& received) {
 }
 
 void HubServer::admit(const RobotStatus& robot) {
+  // The robot's copy is opened once
   const auto fail = [&](const core::Error& error) { report_once(robot.name + ": " + error.message); };
   auto known = robots_.find(robot.name);
   const bool is_new = known == robots_.end();
@@ -163,22 +175,28 @@ void HubServer::admit(const RobotStatus& robot) {
     known = robots_.find(robot.name);
   }
 
+  // A newer process replaces the older one
   RobotSession& session = known->second;
   if (robot.incarnation < session.robot.incarnation) return;  // from a process that has ended
   const bool takes_over = robot.incarnation > session.robot.incarnation;
   if (takes_over) session.reply = {};
   const auto emptied = session.apply(robot);
   if (!emptied) return fail(emptied.error());
+
+  // A robot that lost data sends everything again
   if (*emptied) {
     log_.warning(robot.name + ": has lost transactions that are here; everything is requested again");
     meetings_.restart();
   }
 
+  // The ledger follows every change
   if (is_new || takes_over || *emptied) {
     if (auto saved = save(session); !saved) return fail(saved.error());
     log_.info(fmt::format("{}: {} of its keyframes are here", robot.name, session.copy().keyframes()));
     session.changed = true;
   }
+
+  // New data make a finished robot unfinished
   if (!session.has_all()) session.done = false;
   confirm_if_complete(session);
 }
@@ -200,6 +218,7 @@ void HubServer::confirm_if_complete(RobotSession& session) {
   session.changed = true;
 }
 
+/// Chunks of this process of the robot; failures are answered in its status.
 void HubServer::receive_chunks(RobotSession& session) {
   const RobotStatus& robot = session.robot;
   RobotSession::Reply& reply = session.reply;
@@ -246,6 +265,7 @@ HubStatus HubServer::status_of(const RobotSession& session) const {
   return status;
 }
 
+/// Statuses are repeated, since any may be lost.
 void HubServer::publish_all() {
   const bool due = publisher_.publish_presence();
   for (auto& [name, session] : robots_) {
@@ -261,6 +281,7 @@ std::uint64_t HubServer::received_bytes() const {
   return bytes;
 }
 
+/// One line for the terminal.
 std::string HubServer::progress_line(double kbytes_per_s) const {
   std::size_t keyframes = 0;
   std::size_t silent = 0;
@@ -278,6 +299,7 @@ std::string HubServer::progress_line(double kbytes_per_s) const {
                      behind);
 }
 
+/// Everything received since the last step.
 void HubServer::poll() {
   for (const ReceivedStatus& received : bus_->poll_robots()) receive_status(received);
   for (const HubStatus& hub : bus_->poll_hubs()) {
@@ -293,13 +315,16 @@ void HubServer::poll() {
 }
 
 void HubServer::serve(const core::StopToken& stop, const Status& status) {
+  // Rates are measured between two lines
   auto line_at = Clock::now();
   std::uint64_t before = received_bytes();
 
+  // Statuses and chunks first
   while (!stop.stop_requested()) {
     bus_->wait(kWait);
     poll();
 
+    // Meetings change the common frames
     if (meetings_.step(robots_)) {
       for (auto& [name, session] : robots_) {
         session.changed = true;
@@ -308,10 +333,12 @@ void HubServer::serve(const core::StopToken& stop, const Status& status) {
       }
     }
 
+    // Answers, feedback and display
     publish_all();
     feedback_.step(robots_, meetings_, *bus_);
     show_.step(robots_, meetings_);
 
+    // A line per second
     const double since_s = std::chrono::duration<double>(Clock::now() - line_at).count();
     if (status && since_s >= 1.0) {
       const std::uint64_t now = received_bytes();
@@ -321,9 +348,11 @@ void HubServer::serve(const core::StopToken& stop, const Status& status) {
     }
     if (request_.robots > 0 && done() >= request_.robots) break;
   }
+
   meetings_.finish(robots_);
 }
 
+/// Traffic and final statuses; the copies are closed.
 HubServer::Collected HubServer::close() {
   show_.finish();
   Collected collected;

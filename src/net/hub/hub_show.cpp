@@ -18,15 +18,15 @@ constexpr auto kShowEvery = 2s;
 }  // namespace
 
 void HubShow::step(const std::map<std::string, RobotSession>& robots, const HubMeetings& meetings) {
+  // One job at a time, at a bounded rate
   if (observer_ == nullptr || Clock::now() < next_) return;
-
   if (job_.valid()) {
     if (!job_.ready()) return;
     job_.wait();
   }
-
   next_ = Clock::now() + kShowEvery;
 
+  // Only robots with new data
   std::vector<std::string> names;
   std::vector<Task> tasks;
   for (const auto& [name, session] : robots) {
@@ -37,6 +37,7 @@ void HubShow::step(const std::map<std::string, RobotSession>& robots, const HubM
     tasks.push_back({number, name, session.file(), session.copy().map(), meetings.frame(name)});
   }
 
+  // The display does not delay the hub
   if (tasks.empty()) return;
   job_ = executor_.submit(
       [this, names = std::move(names), tasks = std::make_shared<decltype(tasks)>(std::move(tasks))] {
@@ -56,22 +57,25 @@ void HubShow::show(const std::vector<std::string>& names, const std::vector<Task
 }
 
 core::Result<void> HubShow::show_robot(const Task& task) {
+  // The path in the robot's own frame
   const auto stored = task.copy.map();
   if (!stored) return tl::unexpected(stored.error());
-
   const geometry::Trajectory path = maps::keyframe_trajectory(stored->map);
   if (path.empty()) return {};
 
+  // The common frame comes before the path
   if (!task.frame.frame_of.empty()) observer_->placed(task.number, path.back().stamp, pose_of(task.frame));
   observer_->tracked(task.number, path.back().stamp, path.back().world_from_camera,
                      path.back().world_from_camera);
   observer_->keyframes(task.number, path);
 
+  // Clouds are read from the hub's copy
   const auto store = maps::StoreReader::open(task.file);
   if (!store) return tl::unexpected(store.error());
   const auto clouds = store->cloud_ids();
   if (!clouds) return tl::unexpected(clouds.error());
 
+  // Clouds that were not shown yet
   for (const maps::KeyframePose& keyframe : maps::keyframe_poses(stored->map)) {
     const bool there = std::find(clouds->begin(), clouds->end(), keyframe.id) != clouds->end();
     if (!there || shown_clouds_[task.name].count(keyframe.id) > 0) continue;

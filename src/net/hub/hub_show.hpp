@@ -2,7 +2,7 @@
 #pragma once
 
 // Shows an observer the data that reach a hub: paths, poses and clouds of the robots, from the copies of
-// their stores. A job beside the hub's thread.
+// their stores. A job in parallel to the hub's thread.
 #include <filesystem>
 #include <map>
 #include <memory>

@@ -33,6 +33,7 @@ double Presence::silent_s() const {
 
 bool Presence::silent() const { return !received_at_ || Clock::now() - *received_at_ > kSilent; }
 
+/// The hub's copy of one robot's store.
 core::Result<RobotSession> RobotSession::open(RobotStatus known, const std::filesystem::path& file,
                                               std::uint64_t quota_bytes) {
   if (auto made = core::make_folder(file.parent_path()); !made) return tl::unexpected(made.error());
@@ -57,6 +58,7 @@ std::int64_t RobotSession::certain_head(const RobotStatus& next) const {
       *std::min_element(heads.end() - static_cast<std::ptrdiff_t>(since), heads.end()));
 }
 
+/// The robot's newest status; true if the copy had to be cleared.
 core::Result<bool> RobotSession::apply(const RobotStatus& next) {
   presence.note();
   const maps::StoreHeads& heads = copy_->heads();
@@ -84,6 +86,7 @@ void RobotSession::roll_back() {
   changed = true;
 }
 
+/// A new transaction; the robot's share of the disk is limited.
 core::Result<void> RobotSession::begin(const Chunk& chunk) {
   std::error_code ignored;
   const std::uintmax_t size = std::filesystem::file_size(file_, ignored);
@@ -103,6 +106,7 @@ core::Result<void> RobotSession::begin(const Chunk& chunk) {
 }
 
 core::Result<void> RobotSession::receive(const Chunk& chunk) {
+  // Numbers that no robot sends
   traffic_.received_bytes += chunk.bytes.size();
   if (chunk.stream > 1) return core::input_error("an unknown stream");
   if (chunk.count == 0 || chunk.count > kMaxChunks || chunk.index >= chunk.count || chunk.number <= 0) {
@@ -126,6 +130,7 @@ core::Result<void> RobotSession::receive(const Chunk& chunk) {
   }
   if (chunk.index != incoming_.chunks) return {};
 
+  // The last chunk commits the transaction
   const bool last = chunk.index + 1 == chunk.count;
   const core::Result<void> appended = append(chunk, last);
   if (!appended || last) roll_back();
@@ -133,6 +138,7 @@ core::Result<void> RobotSession::receive(const Chunk& chunk) {
   return appended;
 }
 
+/// A chunk with the right hash; the last one commits the transaction.
 core::Result<void> RobotSession::append(const Chunk& chunk, bool last) {
   core::Hash hash;
   hash.bytes(chunk.bytes.data(), chunk.bytes.size());
@@ -163,6 +169,7 @@ HubStatus RobotSession::status() const {
   return status;
 }
 
+/// The robot's numbers for the summary.
 RobotTraffic RobotSession::traffic() const {
   RobotTraffic t = traffic_;
   t.name = robot.name;

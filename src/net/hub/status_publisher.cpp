@@ -32,6 +32,7 @@ bool StatusPublisher::publish_presence() {
   return true;
 }
 
+/// Repeats the final statuses until robots have had time to receive them.
 void StatusPublisher::publish_final(const std::vector<HubStatus>& statuses,
                                     const core::StopToken& stop) const {
   for (int i = 0; i < kFinalRepeats || !stop.stop_requested(); ++i) {

@@ -46,11 +46,13 @@ void ChunkSender::send(const RobotStatus& robot, const StoreWatch& own, const Hu
   had_reader_ = has_reader;
   if (!has_reader) return;
 
+  // The hub has this transaction: on to the next
   if (sending_ && held(hub, sending_->transaction.stream()) >= sending_->transaction.number())
     sending_.reset();
   if (!sending_) select(own, hub);
   if (!sending_) return;
 
+  // A bounded number of chunks at a time
   for (int i = 0; i < kSentAtATime && sending_->index < sending_->transaction.count(); ++i) {
     Chunk next = sending_->transaction.chunk(sending_->index);
     next.name = robot.name;
@@ -58,6 +60,7 @@ void ChunkSender::send(const RobotStatus& robot, const StoreWatch& own, const Hu
     next.incarnation = robot.incarnation;
     if (!bus_->send(next)) return;
 
+    // Repeated bytes are counted for the summary
     sent_bytes_ += next.bytes.size();
     if (sending_->index < sending_->most) resent_bytes_ += next.bytes.size();
     sending_->most = std::max(sending_->most, ++sending_->index);

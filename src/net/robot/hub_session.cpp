@@ -18,6 +18,7 @@ constexpr auto kSilence = 10s;      // without any hub, until a warning
 
 }  // namespace
 
+/// One warning if no hub answers.
 void HubSession::report_silence(RobotBus& bus) {
   if (silence_reported_ || status_.found || Clock::now() - started_ < kSilence) return;
   silence_reported_ = true;
@@ -53,6 +54,7 @@ bool HubSession::select(const HubStatus& hub) {
 }
 
 bool HubSession::apply(const HubStatus& hub, const RobotStatus& robot) {
+  // A hub of another version cannot read the store
   if (hub.protocol == kProtocol && hub.up_s < 0.0) return false;  // it is not serving yet
   status_.found = true;
   if (hub.protocol != kProtocol || hub.store_format != robot.store_format) {
@@ -61,6 +63,7 @@ bool HubSession::apply(const HubStatus& hub, const RobotStatus& robot) {
     return false;
   }
 
+  // One hub at a time; others are ignored
   const bool another = id_ != hub.hub;
   if (!select(hub)) return false;
   received_at_ = Clock::now();
@@ -76,6 +79,7 @@ bool HubSession::apply(const HubStatus& hub, const RobotStatus& robot) {
   return another;
 }
 
+/// The hub's answer about this run.
 void HubSession::apply_answer(const HubStatus& hub, bool finished) {
   status_.problem = hub.answer == Answer::kTrouble ? hub.problem : "";
   if (!hub.problem.empty() && hub.problem != hub_.problem) log_.warning("hub: " + hub.problem);

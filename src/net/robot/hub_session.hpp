@@ -13,7 +13,7 @@ namespace plumbline::net {
 /// State of the link to the hub, for the program and its user.
 struct LinkStatus {
   bool found = false;       ///< a hub has answered at least once
-  bool connected = false;   ///< it was received from in the last seconds
+  bool connected = false;   ///< a status of it came in the last seconds
   bool done = false;        ///< it has confirmed that it holds everything
   std::string refused;      ///< why it will never accept this run; empty: it was not refused
   std::string problem;      ///< why it cannot store rows at present

@@ -29,6 +29,7 @@ bool is_pose(const std::array<double, 7>& from) {
 
 }  // namespace
 
+/// A robot's place in the common frame.
 void OtherRobots::apply(const HubStatus& hub) {
   if (hub.robot.empty() || (frames_.count(hub.robot) == 0 && frames_.size() >= kMostNames)) return;
   SharedFrame& frame = frames_[hub.robot];
@@ -45,9 +46,11 @@ void OtherRobots::receive(const Chunk& chunk) {
     added.number = ++numbers_;
   }
 
+  // Chunks of unknown maps are dropped
   const auto found = others_.find(chunk.name);
   if (found == others_.end()) return;
 
+  // The first chunk begins a transaction
   Other& other = found->second;
   if (chunk.index == 0) {
     other.incoming = {chunk.number, {}};
@@ -55,6 +58,7 @@ void OtherRobots::receive(const Chunk& chunk) {
     other.chunks = 0;
   }
 
+  // Chunks out of order are dropped
   std::vector<std::uint8_t>& rows = other.incoming.rows;
   if (chunk.checksum != other.checksum || chunk.index != other.chunks || rows.size() > kMostRows) return;
   rows.insert(rows.end(), chunk.bytes.begin(), chunk.bytes.end());
@@ -76,6 +80,7 @@ void OtherRobots::update(Other& other) {
 }
 
 void OtherRobots::publish() {
+  // Maps that nobody uses any more are freed here
   const auto first_transactions = Clock::now();
   if (!changed_ || first_transactions < next_) return;
   changed_ = false;
@@ -83,11 +88,13 @@ void OtherRobots::publish() {
                                   [](const auto& maps) { return maps.use_count() == 1; }),
                    published_.end());
 
+  // All maps that share the frame
   const SharedFrame own = frames_[name_];
   auto all = std::make_shared<mapping::OtherMaps>();
   std::vector<const maps::Map*> maps;
-
   std::vector<Rigid3> own_from_other;
+
+  // Maps are moved to this robot's frame
   for (auto& [name, other] : others_) {
     const SharedFrame frame = frames_[name];
     if (own.frame_of.empty() || frame.frame_of != own.frame_of) continue;
@@ -98,6 +105,7 @@ void OtherRobots::publish() {
     own_from_other.push_back(pose_of(own.frame_from_robot).inverse() * pose_of(frame.frame_from_robot));
   }
 
+  // Larger maps are published less often
   all->map = maps::joined(maps, own_from_other);
   inbox_->put(published_.emplace_back(std::move(all)));
   const auto now = Clock::now();

@@ -69,33 +69,38 @@ class Rate {
 
 /// Waits until the hub has received everything, or the robot gives up.
 core::Result<RobotOutcome> deliver(const RobotRequest& request, const fs::path& folder, const RobotLink& link,
-                                   RobotOutcome outcome, const core::StopToken& stop, bool was_stopped,
-                                   const Status& status) {
+                                   RobotOutcome outcome, const core::StopToken& stop, const Status& status) {
+  // Shown to the user if nothing is delivered
   const std::string command = fmt::format("plumbline robot '{}' {}", folder.string(), request.hand_in);
   const auto since = Clock::now();
   Rate rate;
 
   while (true) {
+    // The hub has everything
     const LinkStatus now = link.status();
     if (now.done) {
       outcome.delivered = true;
       return outcome;
     }
+
+    // A refused run stays in its folder
     if (!now.refused.empty()) {
       return core::usage_error(fmt::format("{}; the map is in {}", now.refused, folder.string()));
     }
     if (status) status(line_of(now, rate(now.sent_bytes)));
 
+    // No hub was ever found
     const auto waited_s = [](Clock::time_point from) {
       return std::chrono::duration<double>(Clock::now() - from).count();
     };
-    const bool stopped = stop.stop_requested() && !was_stopped;
+    const bool stopped = stop.stop_requested();
     if (!now.found && (stopped || waited_s(since) > request.wait_s)) {
       outcome.undelivered = fmt::format("no hub has answered; the map is in {}. To send it later: {}",
                                         folder.string(), command);
       return outcome;
     }
 
+    // The hub stopped making progress
     if (now.found && (stopped || waited_s(std::max(now.progress, since)) > request.wait_lost_s)) {
       const std::string why = now.problem.empty() ? "" : " (" + now.problem + ")";
       return core::failure(
@@ -110,6 +115,7 @@ core::Result<RobotOutcome> deliver(const RobotRequest& request, const fs::path& 
 
 }  // namespace
 
+/// The folder of a run with a store, complete or not.
 fs::path earlier_run(const std::string& input) {
   std::error_code ec;
   if (input.rfind("synth:", 0) == 0) return {};
@@ -119,6 +125,7 @@ fs::path earlier_run(const std::string& input) {
   return {};
 }
 
+/// Sends the store of an earlier run.
 core::Result<RobotOutcome> hand_in(const RobotRequest& request, const fs::path& folder, core::Log& log,
                                    const core::StopToken& stop, const Status& status) {
   if (auto heads = maps::store_heads(folder / kStore); !heads) return tl::unexpected(heads.error());
@@ -126,16 +133,18 @@ core::Result<RobotOutcome> hand_in(const RobotRequest& request, const fs::path& 
   if (!link) return tl::unexpected(link.error());
   if (auto followed = (*link)->follow(folder / kStore); !followed) return tl::unexpected(followed.error());
   (*link)->finish(folder / kStore);
-  return deliver(request, folder, **link, {}, stop, false, status);
+  return deliver(request, folder, **link, {}, stop, status);
 }
 
 core::Result<RobotOutcome> run_robot(const RobotRequest& request, const core::Executor& executor,
                                      core::Log& log, const core::StopToken& stop, const Status& status,
                                      const pipeline::Progress& progress) {
+  // The link runs in parallel with the mapping
   const auto others = request.feedback ? std::make_shared<mapping::OtherMapsInbox>() : nullptr;
   auto link = open_link(request, others, log);
   if (!link) return tl::unexpected(link.error());
 
+  // The store is followed once it exists
   pipeline::MapRequest map = request.map;
   map.feedback = others;
   map.prepared = [&](const fs::path& folder) {
@@ -143,6 +152,7 @@ core::Result<RobotOutcome> run_robot(const RobotRequest& request, const core::Ex
     if (request.map.prepared) request.map.prepared(folder);
   };
 
+  // Progress shows tracking and transmission
   Rate rate;
   const auto frames = [&](std::size_t done, std::size_t total) {
     const LinkStatus now = (*link)->status();
@@ -152,6 +162,7 @@ core::Result<RobotOutcome> run_robot(const RobotRequest& request, const core::Ex
   auto summary = pipeline::map_recording(map, executor, log, stop, frames);
   if (!summary) return tl::unexpected(summary.error());
 
+  // A pipeline without a store has nothing to send
   std::error_code ec;
   const fs::path store = request.map.output / kStore;
   if (!fs::exists(store, ec)) {
@@ -160,11 +171,13 @@ core::Result<RobotOutcome> run_robot(const RobotRequest& request, const core::Ex
         request.map.pipeline));
   }
 
+  // The rest is sent after the mapping
   (*link)->finish(store);
   RobotOutcome outcome;
   outcome.summary = std::move(*summary);
-  return deliver(request, request.map.output, **link, std::move(outcome), stop, stop.stop_requested(),
-                 status);
+  const core::StopToken never;  // a stop that ended the mapping does not end the delivery
+  return deliver(request, request.map.output, **link, std::move(outcome),
+                 stop.stop_requested() ? never : stop, status);
 }
 
 }  // namespace plumbline::net

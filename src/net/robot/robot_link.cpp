@@ -29,6 +29,7 @@ std::vector<std::uint64_t> parse_numbers(const std::string& text) {
   return {std::istream_iterator<std::uint64_t>(words), std::istream_iterator<std::uint64_t>()};
 }
 
+/// Identity and versions, before a store is known.
 RobotStatus initial_status(std::string name, std::string run) {
   RobotStatus status;
   status.name = std::move(name);
@@ -40,6 +41,7 @@ RobotStatus initial_status(std::string name, std::string run) {
 
 }  // namespace
 
+/// Its thread runs from the start.
 RobotLink::RobotLink(std::unique_ptr<RobotBus> bus, std::string name, std::string fresh,
                      std::shared_ptr<mapping::OtherMapsInbox> feedback, core::Log& log)
     : bus_(std::move(bus)),
@@ -51,6 +53,7 @@ RobotLink::RobotLink(std::unique_ptr<RobotBus> bus, std::string name, std::strin
       thread_([this](const core::StopToken& stop) { run(stop); }) {}
 
 core::Result<void> RobotLink::follow(const fs::path& store) {
+  // The run's identity is stored with the map
   const maps::Ledger ledger(store.parent_path() / "network.db");
   auto known = ledger.all();
   if (!known) return tl::unexpected(known.error());
@@ -66,17 +69,20 @@ core::Result<void> RobotLink::follow(const fs::path& store) {
   if (!is_new) next.heads_at_start = parse_numbers(texts["began"]);
   next.heads_at_start.push_back(heads ? static_cast<std::uint64_t>(heads->last()) : 0);
 
+  // Every process of a run counts as an incarnation
   const std::vector<std::uint64_t> incarnation = parse_numbers(texts["incarnation"]);
   if (!is_new) next.incarnation = incarnation.empty() ? 0 : incarnation.front();
   ++next.incarnation;
   if (next.heads_at_start.size() > kMaxIncarnations) next.heads_at_start.erase(next.heads_at_start.begin());
 
+  // The ledger is written before anything is sent
   const auto put = ledger.put({{"run", next.run},
                                {"name", next.name},
                                {"began", fmt::format("{}", fmt::join(next.heads_at_start, " "))},
                                {"incarnation", std::to_string(next.incarnation)}});
   if (!put) return put;
 
+  // Link and sender begin again with the new store
   next.map_head = next.clouds_head = 0;
   robot_ = std::move(next);
   store_.follow(store);
@@ -91,6 +97,7 @@ void RobotLink::finish(const fs::path& store) {
   robot_.finished = true;
 }
 
+/// The link's thread; waiting is bounded so that the store is polled.
 void RobotLink::run(const core::StopToken& stop) {
   while (!stop.stop_requested()) {
     std::this_thread::sleep_for(kPause);
@@ -101,6 +108,7 @@ void RobotLink::run(const core::StopToken& stop) {
   }
 }
 
+/// One exchange with the hub: statuses, chunks and presence.
 void RobotLink::exchange(const std::vector<HubStatus>& statuses) {
   const std::lock_guard<std::mutex> lock(mutex_);
   for (const HubStatus& status : statuses) {
@@ -121,6 +129,7 @@ void RobotLink::receive_feedback(const std::vector<HubStatus>& statuses) {
   others_->publish();
 }
 
+/// New transactions are announced at once.
 void RobotLink::poll_store() {
   const StoreWatch::Change change = store_.poll();
   if (change == StoreWatch::Change::kNone) return;

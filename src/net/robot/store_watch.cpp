@@ -16,6 +16,7 @@ void StoreWatch::moved(fs::path store) {
 }
 
 StoreWatch::Change StoreWatch::poll() {
+  // SQLite writes to the log first
   std::error_code ignored;
   const fs::path log = store_.string() + "-wal";
   const fs::path& written = fs::exists(log, ignored) ? log : store_;
@@ -31,6 +32,7 @@ StoreWatch::Change StoreWatch::poll() {
   size_ = size;
   if (heads->map == heads_.map && heads->clouds == heads_.clouds) return Change::kNone;
 
+  // A store that was replaced begins again
   const bool restarted = heads->map < heads_.map || heads->clouds < heads_.clouds;
   if (restarted) unacknowledged_.clear();
   heads_ = *heads;
@@ -38,6 +40,7 @@ StoreWatch::Change StoreWatch::poll() {
   return restarted ? Change::kRestarted : Change::kGrown;
 }
 
+/// Transactions that the hub lacks; also measures the delay of those it has.
 std::int64_t StoreWatch::behind(const maps::StoreHeads& held) {
   constexpr std::size_t kMostLags = 10000;
   while (!unacknowledged_.empty()) {

@@ -37,6 +37,7 @@ bool is(const py::array& array, char kind, py::ssize_t size) {
 
 }  // namespace
 
+/// A NumPy array that shares the image's memory and keeps it alive.
 py::array array_of(const cv::Mat& image) {
   auto* kept = new cv::Mat(image);
   const py::capsule owner(kept, [](void* p) { delete static_cast<cv::Mat*>(p); });
@@ -45,6 +46,7 @@ py::array array_of(const cv::Mat& image) {
                          : depth == CV_16U ? py::dtype::of<std::uint16_t>()
                                            : py::dtype::of<float>();
 
+  // Rows may be padded
   std::vector<py::ssize_t> shape{kept->rows, kept->cols};
   std::vector<py::ssize_t> strides{static_cast<py::ssize_t>(kept->step[0]),
                                    static_cast<py::ssize_t>(kept->elemSize())};
@@ -69,6 +71,7 @@ cv::Mat depth_of(const py::array& array, const std::string& what) {
   return image_of(array, what, units ? CV_16UC1 : CV_32FC1);
 }
 
+/// The pose as a homogeneous matrix of 4 x 4.
 py::array_t<double> matrix_of(const geometry::Rigid3& pose) {
   py::array_t<double> matrix({4, 4});
   auto m = matrix.mutable_unchecked<2>();
@@ -82,11 +85,14 @@ py::array_t<double> matrix_of(const geometry::Rigid3& pose) {
   return matrix;
 }
 
+/// The pose of a homogeneous matrix of 4 x 4, which must be a rigid motion.
 geometry::Rigid3 pose_of(const py::array& given, const std::string& what) {
   const auto array = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(given);
   if (!array || array.ndim() != 2 || array.shape(0) != 4 || array.shape(1) != 4)
     refuse(given, what, "float64 of 4 x 4");
   const auto m = array.unchecked<2>();
+
+  // Rows hold the rotation and the translation
   Eigen::Matrix3d rotation;
   geometry::Rigid3 pose;
   for (int r = 0; r < 3; ++r) {
@@ -94,6 +100,7 @@ geometry::Rigid3 pose_of(const py::array& given, const std::string& what) {
     pose.translation(r) = m(r, 3);
   }
 
+  // Scaling and mirroring are refused
   constexpr double kSlack = 1e-3;
   const bool is_rotation =
       (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kSlack;
@@ -103,6 +110,7 @@ geometry::Rigid3 pose_of(const py::array& given, const std::string& what) {
   return {Eigen::Quaterniond(rotation), pose.translation};
 }
 
+/// Stamps (N) and poses (N x 4 x 4) of a trajectory.
 py::tuple arrays_of(const geometry::Trajectory& trajectory) {
   const auto count = static_cast<py::ssize_t>(trajectory.size());
   py::array_t<double> stamps(count);
@@ -117,6 +125,7 @@ py::tuple arrays_of(const geometry::Trajectory& trajectory) {
   return py::make_tuple(stamps, matrices);
 }
 
+/// A trajectory from stamps (N) and poses (N x 4 x 4) of the same number.
 geometry::Trajectory trajectory_of(
     const py::array_t<double, py::array::c_style | py::array::forcecast>& stamps,
     const py::array_t<double, py::array::c_style | py::array::forcecast>& matrices) {

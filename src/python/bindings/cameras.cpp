@@ -7,6 +7,7 @@
 namespace plumbline::python {
 namespace {
 
+/// A camera of the given intrinsics; wrong ones are refused at once.
 sensor::Camera make_camera(int width, int height, double fx, double fy, double cx, double cy,
                            double depth_scale, double fps) {
   sensor::Camera camera;

@@ -51,6 +51,8 @@ py::array values(const PointCloudPtr& self, std::vector<T>& column) {
 py::array structured(const PointCloudPtr& self) {
   using P = cloud::Point;
   const auto f = py::dtype::of<float>();
+
+  // NumPy's description of the fields
   const auto u = py::dtype::of<std::uint8_t>();
   py::list names;
   py::list formats;
@@ -66,11 +68,13 @@ py::array structured(const PointCloudPtr& self) {
     offsets.append(offset);
   }
 
+  // The array shares the points' memory
   const py::dtype type(names, formats, offsets, static_cast<py::ssize_t>(sizeof(P)));
   return py::array(type, {static_cast<py::ssize_t>(self->cloud->size())},
                    {static_cast<py::ssize_t>(sizeof(P))}, self->cloud->points.data(), py::cast(self));
 }
 
+/// The columns that the cloud has, as arrays by name.
 py::dict columns(const PointCloudPtr& self) {
   py::dict all;
   cloud::CloudColumns& c = self->columns;
@@ -99,6 +103,7 @@ std::vector<T> vector_of(const py::handle& given, std::size_t count, const std::
   return {array.data(), array.data() + count};
 }
 
+/// Columns by name; unknown names become columns of numbers.
 cloud::CloudColumns columns_of(const py::dict& given, std::size_t count) {
   cloud::CloudColumns columns;
   for (const auto& [key, value] : given) {
@@ -116,12 +121,15 @@ cloud::CloudColumns columns_of(const py::dict& given, std::size_t count) {
   return columns;
 }
 
+/// A cloud from NumPy arrays; points without colour are white.
 PointCloudPtr make_cloud(const FloatArray& points, const std::optional<ByteArray>& colors,
                          const std::optional<FloatArray>& normals, const py::dict& given) {
   check_rows(points, -1, "points");
   const py::ssize_t count = points.shape(0);
   if (colors) check_rows(*colors, count, "colors");
   if (normals) check_rows(*normals, count, "normals");
+
+  // Points of the arrays' rows
   auto self = std::make_shared<PointCloud>();
   self->cloud = std::make_shared<cloud::Cloud>();
   self->cloud->resize(static_cast<std::size_t>(count));
@@ -135,6 +143,8 @@ PointCloudPtr make_cloud(const FloatArray& points, const std::optional<ByteArray
     p.g = colors ? colors->at(i, 1) : 255;
 
     p.b = colors ? colors->at(i, 2) : 255;
+
+    // NaN stands for an unknown normal
     constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
     p.normal_x = normals ? normals->at(i, 0) : kNone;
     p.normal_y = normals ? normals->at(i, 1) : kNone;
@@ -161,6 +171,7 @@ py::tuple filter(const PointCloudPtr& self, const std::string& chain, int thread
   auto result = std::make_shared<PointCloud>();
   std::vector<cloud::FilterReport> reports;
 
+  // Other Python threads run while the filters work
   {
     const py::gil_scoped_release free;
     const session::OpenCvThreads one;
@@ -180,6 +191,7 @@ py::tuple filter(const PointCloudPtr& self, const std::string& chain, int thread
     result->columns = std::move(made);
   }
 
+  // Number of points after every filter
   py::list steps;
   for (const cloud::FilterReport& report : reports)
     steps.append(py::make_tuple(report.type, report.points_in, report.points_out));

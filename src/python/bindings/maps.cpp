@@ -54,6 +54,7 @@ py::tuple read_landmarks(const fs::path& folder) {
   const maps::Map& map = stored.stored().map;
   const geometry::Rigid3& output_from_map = stored.stored().result.output_from_map;
 
+  // One list per array that is returned
   std::vector<double> positions;
   std::vector<std::int32_t> points;
   std::vector<std::int32_t> keyframes;
@@ -62,11 +63,13 @@ py::tuple read_landmarks(const fs::path& folder) {
   std::vector<std::int32_t> robots;
   std::int32_t number = 0;
 
+  // Landmarks in the frame of the result
   for (const core::PointId id : map.point_ids()) {
     const maps::MapPoint& point = map.point(id);
     const Eigen::Vector3d position = output_from_map * point.position;
     positions.insert(positions.end(), position.data(), position.data() + 3);
 
+    // The keyframes that have observed it
     for (const maps::Observation& seen : point.observations) {
       const maps::Keyframe& keyframe = map.keyframe(seen.keyframe);
       const Eigen::Vector2f& pixel = keyframe.features->points[static_cast<std::size_t>(seen.feature)].pixel;
@@ -79,6 +82,7 @@ py::tuple read_landmarks(const fs::path& folder) {
     ++number;
   }
 
+  // The arrays take over the lists
   const auto count = static_cast<py::ssize_t>(points.size());
   return py::make_tuple(owned(std::move(positions), {number, 3}), owned(std::move(points), {count}),
                         owned(std::move(keyframes), {count}), owned(std::move(frames), {count}),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Numbers, exports and pictures of results.
+// Evaluation, exports and images of results.
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
@@ -42,6 +42,7 @@ py::tuple evaluate_trajectory(const Doubles& stamps, const Doubles& poses, const
                         owned(std::move(errors), {count}));
 }
 
+/// Points and, if given, normals; a normal that is not known is zero.
 evaluate::SurfaceSamples samples_of(const Doubles& points, const std::optional<Doubles>& normals) {
   evaluate::SurfaceSamples samples;
   for (py::ssize_t i = 0; i < points.shape(0); ++i) {
@@ -60,12 +61,14 @@ py::tuple evaluate_cloud(const Doubles& points, const std::array<double, 3>& shi
                          const std::optional<Doubles>& normals, const fs::path& reference,
                          const std::vector<std::pair<fs::path, fs::path>>& paths, const OptionValues& values,
                          int threads) {
+  // Options are checked before the files are read
   evaluate::CloudOptions options;
   set_options(options, values, "evaluate_cloud");
   evaluate::SurfaceSamples samples = samples_of(points, normals);
   samples.shift = {shift[0], shift[1], shift[2]};
   evaluate::CloudReport report;
 
+  // Python may run other threads meanwhile
   {
     const py::gil_scoped_release free;
     evaluate::Reference truth;
@@ -76,6 +79,7 @@ py::tuple evaluate_cloud(const Doubles& points, const std::array<double, 3>& shi
           {value_of(dataset::read_trajectory(estimate)), value_of(dataset::read_trajectory(true_path))});
     }
 
+    // The error of every point needs a reference
     const core::Executor executor(threads);
     report = value_of(
         evaluate::evaluate_cloud(samples, reference.empty() ? nullptr : &truth, options, pairs, executor));
@@ -87,12 +91,14 @@ py::tuple evaluate_cloud(const Doubles& points, const std::array<double, 3>& shi
 /// Files that were written, and notes.
 py::tuple write_export(const fs::path& input, const fs::path& output, const std::string& format,
                        const std::string& what, const OptionValues& values, bool replace, int threads) {
+  // Options given by the user
   exports::ExportRequest request;
   request.input = input;
   request.output = output;
   request.format = format;
-
   request.replace = replace;
+
+  // Without a name it is the cloud
   request.content = what == "mesh"         ? exports::Content::kMesh
                     : what == "trajectory" ? exports::Content::kTrajectory
                     : what == "keyframes"  ? exports::Content::kKeyframes
@@ -101,11 +107,13 @@ py::tuple write_export(const fs::path& input, const fs::path& output, const std:
   set_options(request.options, values, "export");
   for (const auto& [key, value] : values) request.given.insert(key);
 
+  // Other Python threads run during the export
   const py::gil_scoped_release free;
   const core::Executor executor(threads);
   Watch log;
   const fs::path pipelines = value_of(find_pipelines());
 
+  // Some formats need the images of the recordings
   request.open = [&](const exports::RecordingName& name) {
     dataset::OpenOptions open;
     open.camera = name.camera;
@@ -116,6 +124,7 @@ py::tuple write_export(const fs::path& input, const fs::path& output, const std:
 
   const exports::ExportSummary summary = value_of(exports::write_export(request, executor, log, nullptr));
 
+  // Python objects need the interpreter's lock again
   const py::gil_scoped_acquire held;
   return py::make_tuple(summary.written, summary.notes);
 }
@@ -138,6 +147,8 @@ void compare(const fs::path& before, const fs::path& after, const fs::path& outp
 /// A result's cloud, paths and, if wanted, lines; `frame`: theirs.
 viz::Scene scene_of(const fs::path& input, bool lines, cloud::CloudFrame& frame) {
   viz::Scene scene;
+
+  // A single cloud has no paths
   if (fs::is_regular_file(input) && input.extension() != ".db") {
     const cloud::CloudFile file = value_of(cloud::read_cloud(input, cloud::LargeCoordinates::kShifted));
     scene.cloud = file.cloud;
@@ -145,10 +156,12 @@ viz::Scene scene_of(const fs::path& input, bool lines, cloud::CloudFrame& frame)
     return scene;
   }
 
+  // A result has paths, and lines on request
   const maps::MapPlace place = value_of(maps::find_map(input));
   const cloud::CloudFile file = value_of(maps::read_map_cloud(place, core::Executor(1)));
   scene.cloud = file.cloud;
   frame = file.frame;
+
   if (!place.result) return scene;
   for (const fs::path& folder : place.result->robot_folders())
     scene.paths.emplace_back().trajectory = value_of(dataset::read_trajectory(folder / "trajectory.txt"));

@@ -8,6 +8,7 @@
 namespace plumbline::python {
 
 void add_errors(py::module_& module) {
+  // Python's exceptions by kind of error
   static const py::exception<Failure> base(module, "Error");
   static const py::exception<Failure> internal(module, "InternalError", base);
   static const py::exception<Failure> config(module, "ConfigError", base);
@@ -15,12 +16,13 @@ void add_errors(py::module_& module) {
   static const py::exception<Failure> untrustworthy(module, "UntrustworthyError", base);
   static const py::exception<Failure> output(module, "OutputError", base);
 
+  // A Failure becomes the exception of its kind
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(thrown);
     } catch (const Failure& failure) {
+      // A run that was stopped is a plain Error
       const auto kind = failure.error.kind;
-
       const py::handle type = kind == core::ErrorKind::kUsage           ? config
                               : kind == core::ErrorKind::kInput         ? input
                               : kind == core::ErrorKind::kUntrustworthy ? untrustworthy

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// map, fuse, and the mapper that frames are fed to.
+// Bindings of map and fuse, and of the mapper that is given its frames one by one.
 #include <memory>
 
 #include "bindings.hpp"
@@ -121,12 +121,14 @@ void add_waiting(py::class_<Class>& run) {
 }
 
 void add_options(py::module_& module) {
+  // Options of all runs
   py::class_<RunOptions>(module, "RunOptions")
       .def_readwrite("pipeline", &RunOptions::pipeline)
       .def_readwrite("set", &RunOptions::set)
       .def_readwrite("replace", &RunOptions::replace)
       .def_readwrite("threads", &RunOptions::threads);
 
+  // Options of a recording, shared by mapping and its readers
   py::class_<RecordingOptions>(module, "RecordingOptions")
       .def(py::init<>())
       .def_readwrite("camera", &RecordingOptions::camera)
@@ -137,6 +139,7 @@ void add_options(py::module_& module) {
       .def_readwrite("poses", &RecordingOptions::poses)
       .def_readwrite("topics", &RecordingOptions::topics);
 
+  // Mapping a recording
   py::class_<MapOptions, RunOptions, RecordingOptions>(module, "MapOptions")
       .def(py::init<>())
       .def_readwrite("others", &MapOptions::others)
@@ -144,6 +147,7 @@ void add_options(py::module_& module) {
       .def_readwrite("known_map", &MapOptions::known_map)
       .def_readwrite("into", &MapOptions::into);
 
+  // Fusion and live mapping
   py::class_<FuseOptions, RunOptions>(module, "FuseOptions")
       .def(py::init<>())
       .def_readwrite("anchor", &FuseOptions::anchor);
@@ -156,12 +160,14 @@ void add_options(py::module_& module) {
 }  // namespace
 
 void add_runs(py::module_& module) {
+  // Both kinds of runs share progress, waiting and stopping
   add_options(module);
   py::class_<Run> run(module, "Run");
   add_waiting(run);
   py::class_<MapperRun> mapper(module, "MapperRun");
   add_waiting(mapper);
 
+  // The mapper is fed frame by frame
   mapper
       .def(py::init<const sensor::Camera&, const fs::path&, const MapperOptions&>(), py::arg("camera"),
            py::arg("output"), py::arg("options"))
@@ -175,6 +181,7 @@ void add_runs(py::module_& module) {
       .def("close", &MapperRun::close)
       .def("abandon", &MapperRun::abandon);
 
+  // Runs of recordings and maps that exist
   module.def("start_map", &start_map, py::arg("input"), py::arg("output"), py::arg("options"));
   module.def("start_fuse", &start_fuse, py::arg("maps"), py::arg("output"), py::arg("options"));
 }

@@ -19,12 +19,15 @@ namespace {
 
 constexpr std::size_t kMaxCameraBytes = 1'000'000;
 
+/// The whole file, if it is small enough for a camera.
 core::Result<std::string> read_camera_text(const std::filesystem::path& file) {
   std::error_code ignored;
   if (std::filesystem::is_directory(file, ignored))
     return core::usage_error(file.string() + ": is a folder, not a camera file");
   std::ifstream stream(file, std::ios::binary);
   if (!stream) return core::usage_error(file.string() + ": no such file, or no permission to read it");
+
+  // A device would never end
   std::string text(kMaxCameraBytes + 1, '\0');  // the file may be a device without end
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(stream.gcount()));
@@ -42,16 +45,19 @@ void replace_all(std::string& text, const std::string& from, const std::string& 
 /// OpenCV's YAML and ROS' messages as standard YAML: without their directive and tags, the first document
 /// only. Lines and columns are not moved.
 std::string plain_yaml(std::string text) {
+  // OpenCV's directive and tags are not YAML
   if (const std::size_t at = text.find("%YAML"); at != std::string::npos && at <= 3) {
     text.replace(at, std::min(text.find('\n', at), text.size()) - at, "");
   }
-
   replace_all(text, "!!opencv-matrix", std::string(15, ' '));
-  bool content = false;
 
+  // Only the first document counts
+  bool content = false;
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());
     const std::string line = text.substr(begin, std::min<std::size_t>(end - begin, 3));
+
+    // A second document ends the text
     if (line == "---" && content) {
       text.resize(begin);
     } else if (line == "---" || line == "...") {
@@ -62,10 +68,10 @@ std::string plain_yaml(std::string text) {
 
     begin = end + 1;
   }
-
   return text;
 }
 
+/// The file as text and, if it can be parsed, as a tree.
 CameraText camera_text(const std::filesystem::path& file, std::string content) {
   CameraText text;
   text.file = file.string();
@@ -100,6 +106,7 @@ bool is_own(const CameraText& text) {
   return text.is_map() && std::any_of(kKeys.begin(), kKeys.end(), has);
 }
 
+/// Names the program if it is known, and shows the lines to write.
 core::Error unknown_kind(const CameraText& text) {
   const std::string other = other_program(text);
   std::string programs;
@@ -122,6 +129,7 @@ const CameraFormat* format_of(const CameraText& text) {
   return nullptr;
 }
 
+/// A camera that another program wrote, checked for values out of range.
 core::Result<CameraReading> read_foreign(const CameraText& text, const CameraFormat& format) {
   if (!text.problems.empty() && text.is_map()) return tl::unexpected(core::to_error(text.problems));
   auto reading = format.read(text);
@@ -136,12 +144,15 @@ core::Result<CameraReading> read_foreign(const CameraText& text, const CameraFor
   return reading;
 }
 
+/// Sizes in pixels, focal lengths, a principal point inside the image.
 std::string pinhole_problem(const Pinhole& p, const std::string& which) {
   const auto focal = [](double f) { return f >= 1e-3 && f <= 1e6; };
   if (p.width < 1 || p.height < 1 || p.width > 32768 || p.height > 32768)
     return fmt::format("{}{}x{} is not the size of an image", which, p.width, p.height);
   if (!focal(p.fx) || !focal(p.fy))
     return fmt::format("{}fx {} and fy {} are not focal lengths", which, p.fx, p.fy);
+
+  // Some programs divide by the image's size
   if (p.fx < 10.0 && p.cx <= 1.0 && p.cy <= 1.0) {
     return fmt::format("{}fx {} and cx {} are shares of the image's size; multiply them by it", which, p.fx,
                        p.cx);
@@ -154,12 +165,15 @@ std::string pinhole_problem(const Pinhole& p, const std::string& which) {
 
 }  // namespace
 
+/// Formats of other programs are tried before camera.yaml.
 core::Result<CameraReading> read_camera_file(const std::filesystem::path& file) {
   auto content = read_camera_text(file);
   if (!content) return tl::unexpected(content.error());
   const CameraText text = camera_text(file, std::move(*content));
   if (const CameraFormat* format = format_of(text)) return read_foreign(text, *format);
   if (!other_program(text).empty()) return tl::unexpected(unknown_kind(text));
+
+  // YAML that is broken gets YAML's message
   const std::string ending = file.extension().string();
   const bool named_so = ending == ".yaml" || ending == ".yml" || ending == ".json";
   const bool broken = text.tree.kind == core::ConfigNode::Kind::kNull && !text.problems.empty();
@@ -184,6 +198,7 @@ bool is_foreign_camera_file(const std::filesystem::path& file, bool numbers_too)
   return format != nullptr && (numbers_too || format->structured);
 }
 
+/// Values that no camera has; empty if all are possible.
 std::string camera_problem(const Camera& camera) {
   if (std::string wrong = pinhole_problem(camera.color, ""); !wrong.empty()) return wrong;
   if (camera.depth) {
@@ -203,11 +218,13 @@ std::string camera_problem(const Camera& camera) {
 }
 
 std::string camera_lines(const Camera& camera) {
+  // Unknown numbers become words to replace
   const Pinhole& p = camera.color;
   const auto known = [](double value, const char* otherwise) {
     return value != 0.0 && std::isfinite(value) ? fmt::format("{}", value) : std::string(otherwise);
   };
 
+  // Unused coefficients are left out
   const Distortion& k = camera.distortion;
   const bool fisheye = camera.model == LensModel::kEquidistant;
   const bool rational = !fisheye && (k[5] != 0.0 || k[6] != 0.0 || k[7] != 0.0);

@@ -15,6 +15,7 @@ namespace {
 
 using core::ConfigNode;
 
+/// Numbers of nested lists and of OpenCV's matrices, in order.
 bool add_numbers(const ConfigNode& node, std::vector<double>& numbers) {
   if (node.kind == ConfigNode::Kind::kNull) return true;
   if (node.kind == ConfigNode::Kind::kSequence) {
@@ -40,6 +41,7 @@ const std::vector<const CameraFormat*>& camera_formats() {
   return formats;
 }
 
+/// No size and no depth scale yet.
 CameraReading blank_reading(const CameraText& text, const CameraFormat& format) {
   CameraReading reading;
   reading.program = format.program;
@@ -49,6 +51,7 @@ CameraReading blank_reading(const CameraText& text, const CameraFormat& format) 
   return reading;
 }
 
+/// An error with the lines of a camera.yaml that are known.
 tl::unexpected<core::Error> refuse_camera(const CameraText& text, const CameraFormat& format,
                                           const core::ConfigMark& mark, const std::string& what,
                                           const Camera& known) {
@@ -61,6 +64,7 @@ tl::unexpected<core::Error> refuse_camera(const CameraText& text, const CameraFo
                                       true});
 }
 
+/// The first of these keys that the map has, in any case of letters.
 const ConfigNode* find_any(const ConfigNode& map, const std::vector<std::string>& names) {
   for (const std::string& name : names) {
     for (const auto& [key, value] : map.entries) {
@@ -93,11 +97,13 @@ std::optional<std::vector<double>> numbers_in(const ConfigNode& node) {
 }
 
 std::string take_matrix(const std::vector<double>& numbers, Camera& camera) {
+  // Square, or with a column for the translation
   const std::size_t columns = numbers.size() == 9 ? 3 : 4;
   if (numbers.size() != 9 && numbers.size() != 12 && numbers.size() != 16) {
     return fmt::format("the matrix has {} numbers (allowed: 3x3, 3x4 or 4x4)", numbers.size());
   }
 
+  // Some writers store columns, not rows
   const auto at = [&](std::size_t row, std::size_t column) { return numbers[row * columns + column]; };
   const bool square = numbers.size() != 12;
   const bool by_columns =
@@ -105,6 +111,7 @@ std::string take_matrix(const std::vector<double>& numbers, Camera& camera) {
   const double skew = by_columns ? at(1, 0) : at(0, 1);
   const double other = by_columns ? at(0, 1) : at(1, 0);
 
+  // Last row and lower triangle of a pinhole matrix
   camera.color.fx = at(0, 0);
   camera.color.fy = at(1, 1);
   camera.color.cx = by_columns ? at(2, 0) : at(0, 2);
@@ -112,18 +119,21 @@ std::string take_matrix(const std::vector<double>& numbers, Camera& camera) {
   if (at(2, 2) != 1.0 || other != 0.0)
     return "the matrix is not that of a camera (expected: fx 0 cx, 0 fy cy, 0 0 1)";
 
+  // No camera here has skewed pixels
   if (std::abs(skew) > 1e-6 * std::abs(at(0, 0))) {
     return fmt::format("the matrix has a skew of {}, which no camera here has", skew);
   }
-
   return "";
 }
 
 std::string take_coefficients(const std::string& model, const std::vector<double>& numbers, Lens& lens) {
+  // Models that OpenCV's two do not cover
   const auto names = [&](std::initializer_list<const char*> words) {
     return std::any_of(words.begin(), words.end(),
                        [&](const char* word) { return model.find(word) != std::string::npos; });
   };
+
+  // Undistorted images work with any lens
   if (names({"ftheta", "fov", "omni", "eucm", "double_sphere", "thin_prism", "mei", "ds-"})) {
     return fmt::format(
         "the model '{}' is not supported (OpenCV's with k1 k2 p1 p2 k3 [k4 k5 k6] and the equidistant one of "
@@ -131,6 +141,7 @@ std::string take_coefficients(const std::string& model, const std::vector<double
         model);
   }
 
+  // Further coefficients may only be zero
   const bool fisheye = names({"equidistant", "fisheye", "kannala", "kb4"});
   const std::size_t known = fisheye ? 4 : lens.k.size();
 
@@ -145,6 +156,7 @@ std::string take_coefficients(const std::string& model, const std::vector<double
         fisheye ? "k1 k2 k3 k4" : "k1 k2 p1 p2 k3 k4 k5 k6");
   }
 
+  // Missing coefficients are zero
   lens.model = fisheye ? LensModel::kEquidistant : LensModel::kRadialTangential;
   std::copy_n(numbers.begin(), std::min(known, numbers.size()), lens.k.begin());
   return "";
@@ -158,6 +170,7 @@ std::string take_coefficients(const std::string& model, const std::vector<double
   return wrong;
 }
 
+/// Focal lengths and principal point must exist, the size may.
 std::string take_pinhole(const ConfigNode& map, Pinhole& pinhole) {
   const auto take = [&](const std::vector<std::string>& names, double& value) {
     const auto number = number_at(map, names);

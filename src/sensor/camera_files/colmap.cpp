@@ -74,6 +74,7 @@ std::string take_colmap(const ColmapModel& model, const std::vector<double>& n, 
 }
 
 core::Result<CameraReading> read_colmap(const CameraText& text) {
+  // The first camera, without its number
   CameraReading reading = blank_reading(text, kColmapCamera);
   const auto lines = camera_text_lines(text.text, kBlanks);
   const std::vector<std::string> first(lines.front().words.begin() + 1, lines.front().words.end());
@@ -82,6 +83,7 @@ core::Result<CameraReading> read_colmap(const CameraText& text) {
       return refuse_camera(text, kColmapCamera, {text.file, line.number, 1}, what, reading.camera);
     };
 
+    // Other cameras must equal the first
     const ColmapModel* model = colmap_model(line);
     if (model == nullptr) return refuse("expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS");
     if (&line != &lines.front()) {
@@ -89,6 +91,7 @@ core::Result<CameraReading> read_colmap(const CameraText& text) {
       return refuse("holds several cameras that differ; leave the one of the colour images");
     }
 
+    // The model decides the number of parameters
     const auto numbers = colmap_numbers(line);
     if (!numbers || numbers->size() != model->parameters + 2)
       return refuse(fmt::format("{} needs a width, a height and {} numbers", model->name, model->parameters));
@@ -96,6 +99,7 @@ core::Result<CameraReading> read_colmap(const CameraText& text) {
       return refuse(wrong);
   }
 
+  // COLMAP's first pixel has its centre at 0.5
   reading.has_size = true;
   reading.notes.emplace_back("half a pixel subtracted from the principal point");
   return reading;

@@ -20,6 +20,7 @@ const core::ConfigNode* kalibr_camera(const CameraText& text) {
 bool recognises_kalibr(const CameraText& text) { return kalibr_camera(text) != nullptr; }
 
 core::Result<CameraReading> read_kalibr(const CameraText& text) {
+  // The first camera is the colour camera
   CameraReading reading = blank_reading(text, kKalibrCamera);
   Camera& camera = reading.camera;
   const core::ConfigNode& node = *kalibr_camera(text);
@@ -28,21 +29,23 @@ core::Result<CameraReading> read_kalibr(const CameraText& text) {
   };
   if (find_any(text.tree, {"cam1"}) != nullptr) reading.notes.emplace_back("cam0 of several cameras");
 
+  // Only the pinhole projection is supported
   const std::string model = word_at(node, {"camera_model"});
   if (!model.empty() && model != "pinhole")
     return refuse(node, fmt::format("the model '{}' is not supported, only 'pinhole' is (with the distortion "
                                     "'radtan' or 'equidistant')",
                                     model));
 
+  // Focal lengths and principal point
   const core::ConfigNode& intrinsics = *find_any(node, {"intrinsics"});
   const auto k = numbers_in(intrinsics);
   if (!k || k->size() != 4) return refuse(intrinsics, "intrinsics are not the four numbers [fx, fy, cx, cy]");
-
   camera.color.fx = (*k)[0];
   camera.color.fy = (*k)[1];
   camera.color.cx = (*k)[2];
   camera.color.cy = (*k)[3];
 
+  // Size and rate are optional
   if (const core::ConfigNode* size = find_any(node, {"resolution"})) {
     const auto pixels = numbers_in(*size);
     if (!pixels || pixels->size() != 2) return refuse(*size, "resolution is not [width, height]");
@@ -50,14 +53,13 @@ core::Result<CameraReading> read_kalibr(const CameraText& text) {
     camera.color.height = static_cast<int>((*pixels)[1]);
     reading.has_size = true;
   }
-
   if (const auto rate = number_at(node, {"rate_hz"}); rate && *rate > 0.0) camera.fps = *rate;
+
+  // Distortion of the named model
   const core::ConfigNode* coefficients = find_any(node, {"distortion_coeffs", "distortion_coefficients"});
   if (coefficients == nullptr) return reading;
-
   const auto d = numbers_in(*coefficients);
   if (!d) return refuse(*coefficients, "the distortion coefficients are not numbers");
-
   const std::string wrong = take_coefficients(word_at(node, {"distortion_model"}), *d, camera);
   if (!wrong.empty()) return refuse(*coefficients, wrong);
   return reading;

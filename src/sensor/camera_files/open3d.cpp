@@ -20,6 +20,7 @@ const core::ConfigNode* open3d_intrinsics(const CameraText& text) {
 bool recognises_open3d(const CameraText& text) { return open3d_intrinsics(text) != nullptr; }
 
 core::Result<CameraReading> read_open3d(const CameraText& text) {
+  // The size may be missing
   constexpr double millimetres = 1000.0;
   CameraReading reading = blank_reading(text, kOpen3dCamera);
   Camera& camera = reading.camera;
@@ -28,16 +29,19 @@ core::Result<CameraReading> read_open3d(const CameraText& text) {
   const auto height = number_at(node, {"height"});
   reading.has_size = width && height;
 
+  // Width and height come together
   if (reading.has_size) {
     camera.color.width = static_cast<int>(*width);
     camera.color.height = static_cast<int>(*height);
   }
 
+  // Millimetres unless the recording says otherwise
   const auto scale = number_at(text.tree, {"depth_scale"});
   camera.depth_scale = scale && *scale > 0.0 ? units_per_metre(*scale) : millimetres;
   reading.has_depth_scale = scale.has_value();
   if (const auto fps = number_at(text.tree, {"fps"}); fps && *fps > 0.0) camera.fps = *fps;
 
+  // Open3D stores the matrix by columns
   const core::ConfigNode& matrix = *find_any(node, {"intrinsic_matrix"});
   const auto k = numbers_in(matrix);
   const std::string wrong = k ? take_matrix(*k, camera) : "intrinsic_matrix does not consist of numbers";

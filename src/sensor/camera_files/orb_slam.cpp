@@ -22,6 +22,7 @@ bool recognises_orb_slam(const CameraText& text) {
   return !orb_prefix(text).empty() || find_any(text.tree, {"camera.type", "camera.fy"}) != nullptr;
 }
 
+/// Coefficients as keys; missing ones are zero.
 std::string take_orb_distortion(const CameraText& text, const std::string& prefix, const std::string& model,
                                 Camera& camera) {
   std::vector<std::string> names = {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
@@ -33,6 +34,7 @@ std::string take_orb_distortion(const CameraText& text, const std::string& prefi
 }
 
 core::Result<CameraReading> read_orb_slam(const CameraText& text) {
+  // Older files say Camera, newer ones Camera1
   CameraReading reading = blank_reading(text, kOrbSlamCamera);
   Camera& camera = reading.camera;
   const std::string prefix = orb_prefix(text).empty() ? "camera." : orb_prefix(text);
@@ -43,19 +45,22 @@ core::Result<CameraReading> read_orb_slam(const CameraText& text) {
     value = number.value_or(0.0);
   };
 
+  // All missing numbers are reported together
   need("fx", camera.color.fx);
   need("fy", camera.color.fy);
   need("cx", camera.color.cx);
   need("cy", camera.color.cy);
+
+  // The size is optional
   const auto width = number_at(text.tree, {"camera.width"});
   const auto height = number_at(text.tree, {"camera.height"});
   reading.has_size = width && height;
-
   if (reading.has_size) {
     camera.color.width = static_cast<int>(*width);
     camera.color.height = static_cast<int>(*height);
   }
 
+  // A depth factor of 0 means 1
   if (const auto fps = number_at(text.tree, {"camera.fps"}); fps && *fps > 0.0) camera.fps = *fps;
   if (const auto factor = number_at(text.tree, {"depthmapfactor", "rgbd.depthmapfactor"})) {
     camera.depth_scale = *factor == 0.0 ? 1.0 : *factor;  // as ORB-SLAM takes it
@@ -63,10 +68,10 @@ core::Result<CameraReading> read_orb_slam(const CameraText& text) {
   }
   if (!missing.empty()) return refuse_camera(text, kOrbSlamCamera, {}, "no number for" + missing, camera);
 
+  // The type of camera decides the distortion
   const std::string model = word_at(text.tree, {"camera.type"});
   if (const std::string wrong = take_orb_distortion(text, prefix, model, camera); !wrong.empty())
     return refuse_camera(text, kOrbSlamCamera, {}, wrong, camera);
-
   return reading;
 }
 

@@ -44,6 +44,7 @@ bool is_matrix(const std::vector<double>& n) {
 }
 
 core::Result<CameraReading> read_plain(const CameraText& text) {
+  // A decimal comma would double the numbers
   CameraReading reading = blank_reading(text, kPlainCamera);
   Camera& camera = reading.camera;
   const auto refuse = [&](int line, const std::string& what) {
@@ -52,12 +53,14 @@ core::Result<CameraReading> read_plain(const CameraText& text) {
   if (const int line = decimal_comma_line(text); line > 0)
     return refuse(line, "decimal comma; write numbers with a point");
 
+  // A matrix, or a list of numbers
   const std::vector<double> n = *plain_numbers(text);
   if (is_matrix(n)) {
     if (const std::string wrong = take_matrix(n, camera); !wrong.empty()) return refuse(0, wrong);
     return reading;
   }
 
+  // A list may end with the distortion
   if (n.size() != 4 && n.size() != 8 && n.size() != 9) {
     return refuse(
         0, fmt::format("has {} numbers (allowed: fx fy cx cy [k1 k2 p1 p2 [k3]], or a matrix of 3x3, 3x4 "
@@ -65,13 +68,13 @@ core::Result<CameraReading> read_plain(const CameraText& text) {
                        n.size()));
   }
 
+  // Focal lengths, principal point, distortion
   camera.color.fx = n[0];
   camera.color.fy = n[1];
   camera.color.cx = n[2];
   camera.color.cy = n[3];
   const std::string wrong = take_coefficients("", {n.begin() + 4, n.end()}, camera);
   if (!wrong.empty()) return refuse(0, wrong);
-
   return reading;
 }
 

@@ -49,6 +49,7 @@ bool recognises_realsense(const CameraText& text) {
   return found.color != nullptr || found.depth != nullptr;
 }
 
+/// Intrinsics of one stream.
 std::string take_stream(const core::ConfigNode& node, Lens& lens, Pinhole& pinhole) {
   if (std::string missing = take_pinhole(node, pinhole); !missing.empty()) return missing;
   const core::ConfigNode* coefficients = find_any(node, {"coeffs", "distortion_coeffs", "coefficients"});
@@ -94,6 +95,7 @@ std::string take_depth_stream(const RealSenseStreams& found, CameraReading& read
 }
 
 core::Result<CameraReading> read_realsense(const CameraText& text) {
+  // The colour stream, else the depth stream
   CameraReading reading = blank_reading(text, kRealSenseCamera);
   Camera& camera = reading.camera;
   const RealSenseStreams found = realsense_streams(text);
@@ -102,28 +104,30 @@ core::Result<CameraReading> read_realsense(const CameraText& text) {
     return refuse_camera(text, kRealSenseCamera, at.mark, what, camera);
   };
 
+  // Intrinsics and distortion
   Lens lens;
   if (const std::string wrong = take_stream(node, lens, camera.color); !wrong.empty())
     return refuse(node, wrong);
-
   camera.model = lens.model;
   camera.distortion = lens.k;
   reading.has_size = camera.color.width > 0 && camera.color.height > 0;
 
+  // RealSense's inverse model is read as OpenCV's
   if (camera.distorted() && has_word(word_at(node, {"model"}), "inverse"))
     reading.notes.emplace_back(
         "coefficients of inverse_brown_conrady taken as OpenCV's, as RealSense's ROS driver does");
 
+  // Depth scale and rate are optional
   if (found.depth_scale && *found.depth_scale > 0.0) {
     camera.depth_scale = units_per_metre(*found.depth_scale);
     reading.has_depth_scale = true;
   }
-
   if (const auto fps = number_at(node, {"fps"}); fps && *fps > 0.0) camera.fps = *fps;
+
+  // The depth stream may be another camera
   if (found.color == nullptr || found.depth == nullptr) return reading;
   if (const std::string wrong = take_depth_stream(found, reading); !wrong.empty())
     return refuse(*found.depth, wrong);
-
   return reading;
 }
 

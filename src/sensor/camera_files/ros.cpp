@@ -27,33 +27,35 @@ std::string cut_out(const core::ConfigNode& tree) {
 }
 
 core::Result<CameraReading> read_ros(const CameraText& text) {
+  // A size of zero is unknown
   CameraReading reading = blank_reading(text, kRosCamera);
   Camera& camera = reading.camera;
   const auto width = number_at(text.tree, {"image_width", "width"});
   const auto height = number_at(text.tree, {"image_height", "height"});
   reading.has_size = width && height && *width >= 1.0 && *height >= 1.0;
-
   if (reading.has_size) {
     camera.color.width = static_cast<int>(*width);
     camera.color.height = static_cast<int>(*height);
   }
 
+  // A camera that was never calibrated has zeros
   const core::ConfigNode& matrix = *find_any(text.tree, kMatrixNames);
   const auto k = numbers_in(matrix);
   if (!k)
     return refuse_camera(text, kRosCamera, matrix.mark, "the camera matrix does not consist of numbers",
                          camera);
-
   if (k->size() == 9 && (*k)[0] == 0.0) {
     return refuse_camera(text, kRosCamera, matrix.mark, "the matrix is zero: this camera was not calibrated",
                          camera);
   }
 
+  // Binning and regions would change the matrix
   if (const std::string wrong = take_matrix(*k, camera); !wrong.empty())
     return refuse_camera(text, kRosCamera, matrix.mark, wrong, camera);
   if (const std::string wrong = cut_out(text.tree); !wrong.empty())
     return refuse_camera(text, kRosCamera, {}, wrong, camera);
 
+  // Distortion of the named model
   const core::ConfigNode* coefficients =
       find_any(text.tree, {"distortion_coefficients", "distortion_coeffs", "dist_coeffs", "d"});
   if (coefficients == nullptr) return reading;

@@ -37,11 +37,13 @@ bool recognises_scannet(const CameraText& text) {
 
 /// Reads the camera `which`, "color" or "depth". Returns "" or what is wrong.
 std::string take_scannet(const ScanNetKeys& keys, const std::string& which, Camera& camera) {
+  // A single number of the file
   const auto value = [&](const std::string& key) {
     const auto found = keys.find(key);
     return found == keys.end() || found->second.size() != 1 ? NAN : found->second[0];
   };
 
+  // Two kinds of files name the keys differently
   const std::string capital = which == "color" ? "Color" : "Depth";
   const bool sens = keys.count("m_calibrationColorIntrinsic") > 0;
 
@@ -56,17 +58,18 @@ std::string take_scannet(const ScanNetKeys& keys, const std::string& which, Came
     camera.color.cy = value("my_" + which);
   }
 
+  // The size is needed for both cameras
   const double width = value(sens ? "m_" + which + "Width" : which + "Width");
   const double height = value(sens ? "m_" + which + "Height" : which + "Height");
   if (!(width >= 1.0) || !(height >= 1.0) || width > 1e6 || height > 1e6)
     return fmt::format("the size of the {} image is missing", which);
-
   camera.color.width = static_cast<int>(width);
   camera.color.height = static_cast<int>(height);
   const bool all = std::isfinite(camera.color.fx + camera.color.fy + camera.color.cx + camera.color.cy);
   return all ? "" : fmt::format("some of fx_{0} fy_{0} mx_{0} my_{0} are missing", which);
 }
 
+/// ScanNet's colour and depth camera, as if they had one pose.
 core::Result<CameraReading> read_scannet(const CameraText& text) {
   CameraReading reading = blank_reading(text, kScanNetCamera);
   const ScanNetKeys keys = scannet_keys(text);

@@ -5,6 +5,7 @@
 
 namespace plumbline::sensor {
 
+/// Words by line; comments and empty lines are left out.
 std::vector<CameraLine> camera_text_lines(const std::string& text, std::string_view separators) {
   std::vector<CameraLine> lines;
   std::size_t begin = text.compare(0, 3, "\xEF\xBB\xBF") == 0 ? 3 : 0;

@@ -46,6 +46,8 @@ class Editor {
  private:
   struct Slab;
   [[nodiscard]] std::optional<Slab> slab(const std::string& wall) const;
+  [[nodiscard]] std::optional<Slab> slab_of_plan(const Plan& plan, const std::string& wall) const;
+  [[nodiscard]] std::optional<Slab> slab_of_object(const std::string& wall) const;
   core::Result<void> move(const Edit& edit);
   core::Result<void> remove(const Edit& edit);
   core::Result<void> add(const Edit& edit);

@@ -68,6 +68,7 @@ void build_stairs(const Stairwell& well, int index, bool lowest, bool highest, d
     b.box(here, lo, hi, {material});
   };
 
+  // A landing only, above the lowest floor.
   b.begin_object("floor", fmt::format("floor of stairs {}", index), mark);
   if (lowest) {
     b.polygon(
@@ -82,6 +83,7 @@ void build_stairs(const Stairwell& well, int index, bool lowest, bool highest, d
   add_ceiling_lamp(b, upright({m, well.y1 - 0.5 * kEntry, ceiling}, 0.0), 0.5, 0.5, 9.0);
   b.begin_object("stairs", "", mark);
 
+  // The highest storey has a ceiling, but no steps.
   if (highest) {
     b.polygon({{well.x0, well.y1, height},
                {well.x1, well.y1, height},
@@ -89,16 +91,19 @@ void build_stairs(const Stairwell& well, int index, bool lowest, bool highest, d
                {well.x0, well.y0, height}},
               Vector3d::UnitX(), {"ceiling"});
 
+    // Rails around the opening.
     if (lowest) return;
     solid({well.x0, well.top() - 0.05, 0.0}, {m - 0.05, well.top(), 1.0}, "paint_grey");
     solid({m - 0.05, well.bottom(), 0.0}, {m + 0.05, well.top(), 1.0}, "paint_grey");
     return;
   }
 
+  // Wall between both flights, and the half landing.
   solid({m - 0.05, well.bottom(), 0.0}, {m + 0.05, well.top(), pitch}, "plaster");
   solid({well.x0, well.y0, 0.5 * pitch - 0.25}, {well.x1, well.bottom(), 0.5 * pitch}, "tiles");
   const int n = steps_of(pitch);
 
+  // Up one flight, back along the other.
   for (int i = 0; i < n; ++i) {
     const double z = 0.5 * pitch * (i + 1) / n, a = well.top() - i * kGoing, c = well.bottom() + i * kGoing;
     solid({well.x0, a - kGoing, std::max(0.0, z - 0.25)}, {m - 0.05, a, z}, "lino");
@@ -115,6 +120,8 @@ BuildingFrame draw_frame(const SynthOptions& options, Rng& rng) {
   frame.stairs = rng.uniform(2.7, 3.1);
   frame.low =
       kEntry + kLanding + steps_of(frame.pitch) * kGoing + 0.5 * frame.outer + 0.15 + rng.uniform(0.0, 0.6);
+
+  // Long enough for the rooms of any storey.
   const int side = (options.rooms + 1) / 2;
   const double length =
       std::max({side * rng.uniform(3.4, 4.4), (options.rooms - side) * 3.2 + frame.stairs,
@@ -146,12 +153,14 @@ void append(const Plan& part, double floor, Plan& plan) {
   plan.storeys.push_back(floor);
   plan.walls.insert(plan.walls.end(), part.walls.begin(), part.walls.end());
 
+  // Rooms refer to walls by number.
   for (PlanRoom room : part.rooms) {
     room.storey = storey;
     for (PlanFace& face : room.faces) face.wall += walls;
     plan.rooms.push_back(room);
   }
 
+  // Openings refer to walls, rooms and each other.
   for (PlanOpening o : part.openings) {
     o.wall += walls;
     o.front += rooms;
@@ -160,6 +169,7 @@ void append(const Plan& part, double floor, Plan& plan) {
     plan.openings.push_back(o);
   }
 
+  // Things refer to rooms.
   for (PlanThing thing : part.things) {
     thing.room += rooms;
     plan.things.push_back(thing);
@@ -175,6 +185,7 @@ Plan storey_of(const Plan& plan, int storey) {
   part.walls = plan.walls;
   int first = -1;
 
+  // Rooms of a storey are consecutive.
   for (std::size_t i = 0; i < plan.rooms.size(); ++i) {
     if (plan.rooms[i].storey != storey) continue;
     if (first < 0) first = static_cast<int>(i);
@@ -182,6 +193,7 @@ Plan storey_of(const Plan& plan, int storey) {
     part.rooms.back().storey = 0;
   }
 
+  // Openings belong to their front room.
   const int last = first + static_cast<int>(part.rooms.size());
   for (PlanOpening o : plan.openings) {
     if (o.front < first || o.front >= last) continue;
@@ -190,6 +202,7 @@ Plan storey_of(const Plan& plan, int storey) {
     part.openings.push_back(o);
   }
 
+  // Things in these rooms.
   for (PlanThing thing : plan.things) {
     if (thing.room < first || thing.room >= last) continue;
     thing.room -= first;
@@ -205,6 +218,127 @@ const PlanRoom* stairs_of(const Plan& plan) {
   return room == plan.rooms.end() ? nullptr : &*room;
 }
 
+/// Independent random numbers for the steps of one storey.
+struct StoreyRandom {
+  explicit StoreyRandom(std::uint64_t own)
+      : cells(own, 1), rooms(own, 2), openings(own, 3), shell(own, 4), things(own, 5) {}
+  Rng cells, rooms, openings, shell, things;
+};
+
+/// Rooms and openings of a storey; false if this attempt failed.
+bool plan_storey(const SynthOptions& options, const BuildingFrame& frame, int storey, StoreyRandom& random,
+                 Plan& part) {
+  const int alike = std::max(options.like, options.copies);
+  if (!add_rooms(draw_storey(frame, options.rooms, alike, options.hall && storey == 0, random.cells),
+                 random.rooms, part))
+    return false;
+
+  // Rooms end at the ceiling; stairs go through it.
+  const bool highest = storey + 1 == options.floors;
+  for (PlanRoom& room : part.rooms) {
+    room.height = std::min(room.height, frame.height);
+    if (room.kind == "stairs") room.height = highest ? frame.height : frame.pitch;
+  }
+
+  // Openings, with every room reachable.
+  if (!add_openings(random.openings, part)) return false;
+  clear_stairs(part);
+  return stairs_of(part) != nullptr && make_alike(part) && connected(part);
+}
+
+/// Walls, the way up and furniture of a storey, with its floor at height 0.
+void build_storey(const SynthOptions& options, const BuildingFrame& frame, int storey, StoreyRandom& random,
+                  Plan& part, Builder& builder) {
+  build_shell(part, random.shell, builder);
+  const PlanRoom* stairs = stairs_of(part);
+  const Stairwell well(*stairs, frame.pitch);
+  const int index = static_cast<int>(stairs - part.rooms.data());
+
+  // One way up: lift or stairs.
+  const bool lowest = storey == 0, highest = storey + 1 == options.floors;
+  if (options.lift) {
+    build_lift_storey(well.shaft(), index, lowest, highest, highest ? frame.height : frame.pitch, builder);
+  } else {
+    build_stairs(well, index, lowest, highest, frame.height, builder);
+  }
+
+  // Furniture keeps off the way up.
+  part.things.push_back(
+      {options.lift ? "lift" : "stairs", options.lift ? "lift" : "stairs",
+       rectangle({0.0, 0.0}, 0.0, {well.x0 + 0.01, well.y0 + 0.01}, {well.x1 - 0.01, well.top()}), 0.0,
+       frame.pitch, index});
+
+  // Furniture on the free floor.
+  Ground ground(part);
+  ground.block(part.things.back().outline, false);
+  ground.recompute();
+  furnish(part, ground, random.things, builder);
+}
+
+/// A path over several storeys, piece by piece.
+class BuildingWalk {
+ public:
+  /// `storeys`: the walk on each; `height`: of the camera over the floor, metres.
+  BuildingWalk(const Plan& plan, const Stairwell& well, std::vector<RobotPath> storeys, double height)
+      : plan_(plan), well_(well), storeys_(std::move(storeys)), height_(height), path_(storeys_.front()) {
+    path_.waypoints.clear();
+  }
+
+  /// A storey's walk, at the height of its floor.
+  void tour(int k) {
+    for (Waypoint w : storeys_[static_cast<std::size_t>(k)].waypoints) {
+      const Vector3d lift(0.0, 0.0, plan_.storeys[static_cast<std::size_t>(k)] + height_ - w.position.z());
+      w.position += lift;
+      if (w.look) *w.look += lift;
+      path_.waypoints.push_back(w);
+    }
+  }
+
+  /// By the lift or on the stairs.
+  void change_storey(int from, int to) {
+    if (stairs_of(plan_)->kind != "lift") {
+      climb(from, to);
+    } else if (from != to) {
+      ride(from, to);
+    }
+  }
+
+  [[nodiscard]] const RobotPath& path() const { return path_; }
+
+ private:
+  /// The lift takes the camera from storey to storey.
+  void ride(int from, int to) {
+    const auto z = [&](int storey) { return plan_.storeys[static_cast<std::size_t>(storey)] + height_; };
+    for (const Vector3d& p : lift_ride(well_.shaft(), z(from), z(to))) {
+      Waypoint w;
+      w.position = p;
+      if (p.y() < well_.top() - 0.5) w.look = Vector3d(p.x(), well_.top() + 2.0, p.z() - 0.4);
+      path_.waypoints.push_back(w);
+    }
+  }
+
+  /// Storey by storey, up or down the stairs.
+  void climb(int from, int to) {
+    for (int k = from; k != to; k += to > from ? 1 : -1) {
+      std::vector<Vector3d> steps = well_.climb();
+      const double floor = plan_.storeys[static_cast<std::size_t>(to > from ? k : k - 1)];
+      if (to < from) std::reverse(steps.begin(), steps.end());
+      for (const Vector3d& p : steps) {
+        Waypoint w;
+        w.position = p + Vector3d(0.0, 0.0, floor + height_);
+        w.pitch_rad = -0.15;
+        path_.waypoints.push_back(w);
+      }
+    }
+  }
+
+  const Plan& plan_;
+  const Stairwell& well_;
+  std::vector<RobotPath> storeys_;
+  double height_;
+  RobotPath path_;
+};
+
 }  // namespace
 
 bool build_building(const SynthOptions& options, std::uint64_t seed, Scene& scene, Plan& plan) {
@@ -214,56 +348,25 @@ bool build_building(const SynthOptions& options, std::uint64_t seed, Scene& scen
   Builder builder(scene);
 
   for (int storey = 0; storey < options.floors; ++storey) {
-    const std::uint64_t own = mix(seed, static_cast<std::uint64_t>(storey) + 1);
-    Rng cells(own, 1), rooms(own, 2), openings(own, 3), shell(own, 4), things(own, 5);
+    // Each storey has independent random numbers.
+    StoreyRandom random(mix(seed, static_cast<std::uint64_t>(storey) + 1));
     Plan part;
     part.kind = plan.kind;
     part.number = plan.number;
     part.copies = plan.copies;
+    if (!plan_storey(options, frame, storey, random, part)) return false;
 
-    const int alike = std::max(options.like, options.copies);
-    if (!add_rooms(draw_storey(frame, options.rooms, alike, options.hall && storey == 0, cells), rooms, part))
-      return false;
-
-    const bool lowest = storey == 0, highest = storey + 1 == options.floors;
-    for (PlanRoom& room : part.rooms) {
-      room.height = std::min(room.height, frame.height);
-      if (room.kind == "stairs") room.height = highest ? frame.height : frame.pitch;
-    }
-
-    if (!add_openings(openings, part)) return false;
-    clear_stairs(part);
-    const PlanRoom* stairs = stairs_of(part);
-    if (stairs == nullptr || !make_alike(part) || !connected(part)) return false;
-
-    const double floor = storey * frame.pitch;
+    // Built at height 0, then raised to the storey's height.
     const std::size_t faces = scene.faces.size(), lamps = scene.lamps.size(), leaves = scene.leaves.size();
-    build_shell(part, shell, builder);
-    const Stairwell well(*stairs, frame.pitch);
-    const int index = static_cast<int>(stairs - part.rooms.data());
-
-    if (options.lift) {
-      build_lift_storey(well.shaft(), index, lowest, highest, highest ? frame.height : frame.pitch, builder);
-    } else {
-      build_stairs(well, index, lowest, highest, frame.height, builder);
-    }
-
-    part.things.push_back(
-        {options.lift ? "lift" : "stairs", options.lift ? "lift" : "stairs",
-         rectangle({0.0, 0.0}, 0.0, {well.x0 + 0.01, well.y0 + 0.01}, {well.x1 - 0.01, well.top()}), 0.0,
-         frame.pitch, index});
-
-    Ground ground(part);
-    ground.block(part.things.back().outline, false);
-    ground.recompute();
-    furnish(part, ground, things, builder);
+    build_storey(options, frame, storey, random, part, builder);
+    const double floor = storey * frame.pitch;
     for (std::size_t i = faces; i < scene.faces.size(); ++i) scene.faces[i].origin.z() += floor;
-
     for (std::size_t i = lamps; i < scene.lamps.size(); ++i) scene.lamps[i].center.z() += floor;
     for (std::size_t i = leaves; i < scene.leaves.size(); ++i) scene.leaves[i].hinge.z() += floor;
     append(part, floor, plan);
   }
 
+  // One lift serves all storeys.
   if (options.lift) {
     for (PlanRoom& room : plan.rooms) {
       if (room.kind == "stairs") room.kind = "lift";
@@ -279,6 +382,7 @@ RobotPath plan_building_path(const Plan& plan, Route route, int robot, Rng& rng)
   std::vector<RobotPath> storeys;
   std::optional<Stairwell> well;
 
+  // Walks on each storey, which begin and end at the stairs.
   for (int k = 0; k < floors; ++k) {
     const Plan part = storey_of(plan, k);
     const PlanRoom* stairs = stairs_of(part);
@@ -290,64 +394,23 @@ RobotPath plan_building_path(const Plan& plan, Route route, int robot, Rng& rng)
     if (storeys.back().waypoints.empty()) return {};
   }
 
-  RobotPath path = storeys.front();
-  path.waypoints.clear();
-
-  const auto tour = [&](int k) {
-    for (Waypoint w : storeys[static_cast<std::size_t>(k)].waypoints) {
-      const Vector3d lift(0.0, 0.0, plan.storeys[static_cast<std::size_t>(k)] + height - w.position.z());
-      w.position += lift;
-      if (w.look) *w.look += lift;
-      path.waypoints.push_back(w);
-    }
-  };
-
-  const bool lift = stairs_of(plan)->kind == "lift";
-  const auto ride = [&](int from, int to) {
-    const auto z = [&](int storey) { return plan.storeys[static_cast<std::size_t>(storey)] + height; };
-    for (const Vector3d& p : lift_ride(well->shaft(), z(from), z(to))) {
-      Waypoint w;
-      w.position = p;
-      if (p.y() < well->top() - 0.5) w.look = Vector3d(p.x(), well->top() + 2.0, p.z() - 0.4);
-      path.waypoints.push_back(w);
-    }
-  };
-
-  const auto climb = [&](int from, int to) {
-    if (lift) {
-      if (from != to) ride(from, to);
-      return;
-    }
-
-    for (int k = from; k != to; k += to > from ? 1 : -1) {
-      std::vector<Vector3d> steps = well->climb();
-      const double floor = plan.storeys[static_cast<std::size_t>(to > from ? k : k - 1)];
-      if (to < from) std::reverse(steps.begin(), steps.end());
-      for (const Vector3d& p : steps) {
-        Waypoint w;
-        w.position = p + Vector3d(0.0, 0.0, floor + height);
-        w.pitch_rad = -0.15;
-        path.waypoints.push_back(w);
-      }
-    }
-  };
-
   // Up from where it starts, then down over those below, and back.
+  BuildingWalk walk(plan, *well, std::move(storeys), height);
   int at = start;
-  tour(at);
+  walk.tour(at);
 
   for (int k = start + 1; k < floors; ++k) {
-    climb(k - 1, k);
-    tour(at = k);
+    walk.change_storey(k - 1, k);
+    walk.tour(at = k);
   }
 
   for (int k = start - 1; k >= 0; --k) {
-    climb(at, k);
-    tour(at = k);
+    walk.change_storey(at, k);
+    walk.tour(at = k);
   }
-  climb(at, start);
+  walk.change_storey(at, start);
 
-  return path;
+  return walk.path();
 }
 
 }  // namespace plumbline::synth

@@ -133,11 +133,14 @@ Subdivision draw_office(int alike, bool hall, Rng& rng) {
   const double high = hall ? rng.uniform(6.5, 9.5) : rng.uniform(3.6, 6.5);
   const double length =
       std::max({rng.uniform(16.0, 30.0), alike > 1 ? 6.5 + 3.2 * alike : 0.0, hall ? 24.5 : 0.0});
+
+  // Rooms on both sides of a corridor.
   Subdivision s({length, low + corridor + high}, rng.uniform(0.28, 0.45));
   const int middle = cut(s, 0, 1, low + corridor, rng, false).value_or(0);
   const int lowest = cut(s, middle, 1, low, rng, false).value_or(0);
   cell(s, middle).kind = "corridor";
 
+  // Special rooms are cut off first.
   if (alike > 1) slice_alike(s, 0, alike, rng);
   if (hall) cut_hall(s, 0, rng);
   slice(s, 0, 2.4, rng.uniform(5.0, 9.0), rng);
@@ -155,6 +158,7 @@ Subdivision draw_corridors(Rng& rng) {
   const double width = blocks * block + (blocks + 1) * corridor;
   Subdivision s({width, depth + (comb ? 1.0 : 2.0) * corridor}, rng.uniform(0.24, 0.4));
 
+  // Corridors along the blocks.
   int middle = 0;
   if (!comb) {
     middle = cut(s, 0, 1, depth + corridor, rng, false).value_or(0);
@@ -206,12 +210,17 @@ Subdivision draw_storey(const BuildingFrame& frame, int rooms, int alike, bool h
   const auto level = [&](int index, double y) {
     return s.split(index, {0.0, y}, -Vector2d::UnitX(), kThickness).value_or(0);
   };
+
+  // A corridor between two rows of rooms.
   const int middle = level(0, frame.low + frame.corridor);
   const int lowest = level(middle, frame.low);
   cell(s, middle).kind = "corridor";
+
+  // Stairs at one end of the lower row.
   const int stairs = s.split(lowest, {frame.stairs, 0.0}, Vector2d::UnitY(), kThickness).value_or(0);
   cell(s, stairs).kind = "stairs";
 
+  // The upper row gets the larger half.
   const int high = std::max((rooms + 1) / 2, alike > 1 ? alike + 2 : 0);
   if (alike > 1) slice_alike(s, 0, alike, rng);
   if (hall) cut_hall(s, 0, rng);
@@ -258,6 +267,7 @@ bool add_rooms(const Subdivision& cells, Rng& rng, Plan& plan) {
     const auto faces = cells.faces(cell);
     if (!faces) return false;
 
+    // The largest room without a kind.
     PlanRoom room;
     room.faces = *faces;
     room.kind = cell.kind;
@@ -273,7 +283,6 @@ bool add_rooms(const Subdivision& cells, Rng& rng, Plan& plan) {
     const auto outer = std::min_element(room.faces.begin(), room.faces.end(),
                                         [](const PlanFace& a, const PlanFace& b) { return a.wall < b.wall; });
     std::rotate(room.faces.begin(), outer, room.faces.end());
-
     plan.alike.push_back(static_cast<int>(i));
   }
 
@@ -285,12 +294,12 @@ bool add_rooms(const Subdivision& cells, Rng& rng, Plan& plan) {
 
     if (area < 4.0 && limited) return false;
     if (area > 60.0 && limited) return false;
-
     if (limited || room.kind == "alike") room.kind = room_kind(plan.kind, area, i == largest, rng);
 
     room.height = rng.chance(0.3) ? std::max(2.3, storey - rng.uniform(0.1, 0.4)) : storey;
     room.floor_material = floor_of(room.kind, rng);
 
+    // Materials, often the usual ones.
     static const std::vector<std::string> kWalls = {"plaster", "paint_blue", "paint_green", "paint_grey"};
     room.wall_material = rng.chance(0.55) ? usual : rng.pick(kWalls);
     room.accent_material = rng.chance(0.25)
@@ -298,6 +307,7 @@ bool add_rooms(const Subdivision& cells, Rng& rng, Plan& plan) {
                                : room.wall_material;
   }
 
+  // Rooms alike are copies but for their place.
   for (const int like : plan.alike) {
     PlanRoom &room = plan.rooms[static_cast<std::size_t>(like)],
              copy = plan.rooms[static_cast<std::size_t>(plan.alike.front())];

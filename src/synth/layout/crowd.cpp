@@ -32,7 +32,7 @@ struct Seat {
   double yaw;
 };
 
-/// Writes down a person's poses, one after the other.
+/// Records a person's poses, one after the other.
 class Day {
  public:
   Day(const Vector2d& at, double yaw, double floor, double speed) : floor_(floor), speed_(speed) {
@@ -46,7 +46,7 @@ class Day {
     for (int n = static_cast<int>(std::lround(seconds / kFigureStep)); n > 0; --n) poses_.push_back(now_);
   }
 
-  /// On the spot: first one foot is put down anew, then the other.
+  /// On the spot: first one foot is put down again, then the other.
   void turn(double yaw) {
     const FigurePose before = now_;
     const double angle = wrap(yaw - before.yaw);
@@ -68,6 +68,7 @@ class Day {
     const int count = std::max(1, static_cast<int>(std::lround(length / (0.28 + 0.3 * speed_))));
     const double step = length / count;
 
+    // Footprints at whole steps.
     const Vector3d start[2] = {now_.foot[0], now_.foot[1]};
     const auto footprint = [&](int k, int side) {
       if (k <= 0) return start[side];
@@ -75,10 +76,13 @@ class Day {
       return sole(point(line, d), heading(line, d), side);
     };
 
+    // One foot swings while the other stands.
     over(length / speed_, [&](double s) {
       const double steps = s * count;
       now_.hip = lifted(point(line, s * length), floor_ + kHipHeight);
       now_.yaw = heading(line, s * length);
+
+      // Left and right are half a cycle apart.
       for (const int side : {0, 1}) {
         const int k = side + 2 * static_cast<int>(std::floor((steps + 0.5 - side) / 2.0));
         const double from = std::max(0.0, k + 0.5), to = std::min(k + 1.5, static_cast<double>(count));
@@ -90,6 +94,8 @@ class Day {
 
   void sit(const Seat& seat, double seconds) {
     turn(seat.yaw);
+
+    // Down onto the seat, and up again.
     const Vector3d up = now_.hip;
     Vector3d down = lifted(up.head<2>() - kSeatDepth * ahead_of(seat.yaw), floor_ + 0.53);
     over(1.2, [&](double s) { now_.hip = up + ease(s) * (down - up); });
@@ -112,6 +118,7 @@ class Day {
     return from + ease(part) * (to - from) + lift * Vector3d::UnitZ();
   }
 
+  /// Poses at the figure's rate; `pose` gets the share of the time that has passed.
   template <typename Pose>
   void over(double seconds, const Pose& pose) {
     const int n = std::max(1, static_cast<int>(std::lround(seconds / kFigureStep)));
@@ -127,6 +134,7 @@ class Day {
     return sum;
   }
 
+  /// Point of a line at a distance from its start.
   static Vector2d point(const std::vector<Vector2d>& line, double d) {
     for (std::size_t i = 1; i < line.size(); ++i) {
       const double piece = (line[i] - line[i - 1]).norm();
@@ -151,10 +159,12 @@ class Day {
 class Stage {
  public:
   Stage(const Scene& scene, double height) : floor(height), ground_(scene, height) {
+    // Camera paths on this storey.
     for (const Waypoint& w : scene.robots.front().waypoints) {
       if (w.position.z() > floor + 0.5 && w.position.z() < floor + 2.2) path_.push_back(w.position.head<2>());
     }
 
+    // Extent and first face of each object.
     std::vector<Eigen::AlignedBox3d> boxes(scene.objects.size());
     std::vector<const Face*> fronts(scene.objects.size(), nullptr);
     for (const Face& face : scene.faces) {
@@ -163,6 +173,7 @@ class Stage {
       for (const Vector2d& uv : face.polygon) boxes[k].extend(face.at(uv.x(), uv.y()));
     }
 
+    // Seats that people can walk up to.
     for (std::size_t k = 0; k < boxes.size(); ++k) {
       const std::string& type = scene.objects[k].type;
       if ((type != "sofa" && type != "chair" && type != "bed") || fronts[k] == nullptr) continue;
@@ -200,6 +211,7 @@ class Stage {
     return true;
   }
 
+  /// Nearest seat within 4 m; none: there is no such seat.
   [[nodiscard]] const Seat* nearest_seat(const Vector2d& p) const {
     const Seat* best = nullptr;
     for (const Seat& seat : seats_) {
@@ -255,6 +267,7 @@ bool add_people(int count, int seed, Scene& scene) {
 
   Rng rng(static_cast<std::uint64_t>(seed), 0x3a1c);
 
+  // The storey on which the path is at that point.
   for (int tries = 0; scene.walkers.size() < wanted && tries < 100; ++tries) {
     const double eyes = rng.pick(path).position.z();
     double floor = 0.0;
@@ -270,6 +283,7 @@ bool add_people(int count, int seed, Scene& scene) {
     const Vector2d other = stage.opposite(*home).value_or(*home);
     std::vector<Day> days;
 
+    // Two people who face each other at first.
     for (const Vector2d& at : {*home, other}) {
       if (at == *home && !days.empty()) break;
       const Vector2d& to = days.empty() ? other : *home;
@@ -277,6 +291,7 @@ bool add_people(int count, int seed, Scene& scene) {
       days.push_back(live(stage, at, yaw, share, rng.uniform(0.6, 1.1), rng));
     }
 
+    // They wait, so that both days have one length.
     for (Day& day : days) {
       if (scene.walkers.size() >= wanted) break;
       day.stand(std::max(days.front().seconds(), days.back().seconds()) - day.seconds());

@@ -52,6 +52,7 @@ whiteboard hanging 0.05   1.0  2.0    0    0  0.8  1.1 whiteboard               
 sign       hanging 0.08   0.2 0.35    0    0 0.12  0.2 sign                       -    corridor,hall,office
 )";
 
+/// The table of furniture, parsed once.
 const std::vector<Rule>& rules() {
   static const std::vector<Rule> kAll = [] {
     std::vector<Rule> all;
@@ -132,6 +133,7 @@ class Furnisher {
     const auto& like = plan_.alike;
     fill(like.front(), fullness);
 
+    // All that was added since belongs to the first room.
     const std::size_t ends[] = {scene.objects.size(), scene.faces.size(), scene.lamps.size(),
                                 plan_.things.size()};
 
@@ -145,6 +147,7 @@ class Furnisher {
         return fmt::format("{} {}", scene.objects[object].type, base + object - objects + 1);
       };
 
+      // Objects first, for faces refer to them.
       for (std::size_t k = objects; k < ends[0]; ++k) {
         scene.objects.push_back(scene.objects[k]);
         scene.objects.back().name = name(k);
@@ -154,10 +157,10 @@ class Furnisher {
         Face face = scene.faces[k];
         const auto object = static_cast<std::size_t>(face.object);
         const std::string& type = scene.objects[object].type;
-
         face.origin += shift;
         face.object = static_cast<int>(base + object - objects);
 
+        // Prints differ, unless the rooms are copies.
         if (!plan_.copies &&
             (type == "poster" || type == "picture" || type == "sign" || type == "whiteboard"))
           face.seed = face.object + 1;
@@ -169,6 +172,7 @@ class Furnisher {
         scene.lamps.back().center += shift;
       }
 
+      // The plan lists the copies too.
       for (std::size_t k = things; k < ends[3]; ++k) {
         PlanThing thing = plan_.things[k];
         for (Vector2d& p : thing.outline) p += way;
@@ -208,6 +212,7 @@ class Furnisher {
   }
 
   void add(const Rule& rule) {
+    // Several attempts, for rooms fill up.
     for (int tries = 0; tries < 8; ++tries) {
       const auto face = static_cast<std::size_t>(rng_.integer(0, static_cast<int>(room().faces.size()) - 1));
       Item item{&rule,
@@ -225,6 +230,8 @@ class Furnisher {
     const double free = length - item.size.x() - 0.2;
     if (free < 0.0) return false;
     const double x = 0.1 + rng_.uniform(0.0, free), z = rng_.uniform(1.45, 1.7);
+
+    // Things on one wall must not overlap.
     const Range part{x - 0.06, x + item.size.x() + 0.06};
     auto& hung = hung_[static_cast<std::size_t>(room_)][face];
     if (std::any_of(hung.begin(), hung.end(), [&](const Range& r) { return overlap(r, part); })) return false;
@@ -233,8 +240,8 @@ class Furnisher {
     item.frame = placed(item.frame, {x + 0.5 * item.size.x(), 0.0, z}, {0.0, Vector3d::UnitZ()});
     const bool framed = item.rule->type == "picture" || item.rule->type == "whiteboard";
     begin(item.rule->type);
-    add_panel(b_, item.frame, item.size.x(), item.size.z(), 0.008, item.material,
-              framed ? "metal" : "paint_white", framed);
+    add_panel(b_, item.frame,
+              {item.size.x(), item.size.z(), 0.008, item.material, framed ? "metal" : "paint_white", framed});
     return true;
   }
 
@@ -242,12 +249,13 @@ class Furnisher {
     const double length = (room().faces[face].from - room().faces[face].to).norm();
     const Vector2d half = 0.5 * item.size.head<2>();
 
+    // With its back to the wall.
     if (item.rule->place == "wall") {
       const double x = rng_.uniform(half.x() + 0.02, std::max(half.x() + 0.02, length - half.x() - 0.02));
       item.frame = placed(item.frame, {x, -half.y() - 0.03, 0.0}, {0.0, Vector3d::UnitZ()});
     } else {
+      // Anywhere in the room, mostly parallel to it.
       Eigen::AlignedBox2d box;
-
       for (const PlanFace& f : room().faces) box.extend(f.from);
       const double turn =
           rng_.integer(0, 3) * 0.5 * M_PI + (rng_.chance(0.3) ? rng_.uniform(-0.4, 0.4) : 0.0);
@@ -296,6 +304,8 @@ class Furnisher {
       if (d.dot(u) > 0.0 && d.dot(u) < u.squaredNorm() && d.dot(v) > 0.0 && d.dot(v) < v.squaredNorm())
         return false;
     }
+
+    // Neither on furniture nor in front of openings.
     if (std::any_of(taken_.begin(), taken_.end(), [&](const auto& other) { return overlap(outline, other); }))
       return false;
     return std::none_of(plan_.openings.begin(), plan_.openings.end(),
@@ -337,6 +347,8 @@ class Furnisher {
       const double x = ((i + 0.5) / count - 0.5) * item.size.x(), y = side * (0.5 * item.size.y() + 0.36);
       const Rigid3 frame = placed(item.frame, {x, y, 0.0}, {side < 0.0 ? M_PI : 0.0, Vector3d::UnitZ()});
       const Rigid3 turned = placed(frame, Vector3d::Zero(), {rng_.uniform(-0.3, 0.3), Vector3d::UnitZ()});
+
+      // Some places stay empty.
       if (!rng_.chance(0.8) || !put("chair", turned, {0.31, 0.31}, 1.05)) continue;
       begin("chair");
       add_chair(b_, turned, rng_.chance(0.6) ? "fabric" : "sofa");
@@ -360,18 +372,21 @@ void add_thing(Builder& b, const std::string& type, const Rigid3& frame, const V
                const std::string& material) {
   const Vector2d half = 0.5 * s.head<2>();
 
+  // Pieces with parts.
   if (type == "desk") add_desk(b, frame, s, material);
   if (type == "chair") add_chair(b, frame, material);
   if (type == "table") add_table(b, frame, s, material);
   if (type == "shelf") add_shelf(b, frame, s, material, true);
   if (type == "sofa") add_sofa(b, frame, s, material);
   if (type == "cabinet") add_cabinet(b, frame, s, material, std::max(1, static_cast<int>(s.x() / 0.55)));
-
   if (type == "plant") add_plant(b, frame, s.z());
   if (type == "floor_lamp") add_floor_lamp(b, frame, s.z(), 1.5);
+
+  // A plain block.
   if (type == "box" || type == "column")
     b.box(frame, {-half.x(), -half.y(), 0.0}, {half.x(), half.y(), s.z()}, {material});
 
+  // Frame, mattress, headboard and pillow.
   if (type == "bed") {
     b.box(frame, {-half.x(), -half.y(), 0.08}, {half.x(), half.y(), 0.55 * s.z()}, {"wood"});
     b.box(frame, {-half.x() + 0.02, -half.y() + 0.02, 0.55 * s.z()},
@@ -385,6 +400,7 @@ void furnish(Plan& plan, Ground& ground, Rng& rng, Builder& builder) {
   Furnisher furnisher(plan, ground, rng, builder);
   const double usual = rng.uniform(0.1, 1.0);
   for (std::size_t i = 0; i < plan.rooms.size(); ++i) {
+    // Some rooms stay empty.
     const double fullness = rng.chance(0.08) ? 0.0 : std::min(1.0, usual * rng.uniform(0.6, 1.4));
     const bool like =
         std::find(plan.alike.begin(), plan.alike.end(), static_cast<int>(i)) != plan.alike.end();

@@ -30,12 +30,14 @@ Ground::Ground(const Plan& plan, int storey) {
   free_ = cv::Mat1b::zeros(static_cast<int>(cells.y()) + 1, static_cast<int>(cells.x()) + 1);
   see_ = free_.clone();
 
+  // Floors of the storey's rooms.
   for (const PlanRoom& room : plan.rooms) {
     if (room.storey != storey) continue;
     fill(free_, room.outline(), 1);
     fill(see_, room.outline(), 1);
   }
 
+  // Openings to walk or see through.
   for (const PlanOpening& o : plan.openings) {
     if (plan.rooms[static_cast<std::size_t>(o.front)].storey != storey) continue;
     const PlanWall& wall = plan.walls[static_cast<std::size_t>(o.wall)];
@@ -45,9 +47,12 @@ Ground::Ground(const Plan& plan, int storey) {
     if (o.back >= 0 && o.leaf != Leaf::kShut && o.leaf != Leaf::kAjar) fill(see_, between, 1);
     if (o.leaf != Leaf::kAjar && o.leaf != Leaf::kOpen) continue;
 
+    // A leaf that stands open blocks the floor.
     for (const PlanFace& face : plan.rooms[static_cast<std::size_t>(o.front)].faces) {
       const auto part = part_of_face(plan, o.front, face, o);
       if (!part) continue;
+
+      // The leaf turns about the hinge.
       const geometry::Rigid3 frame = face_frame(face);
       const double turn = std::atan2(frame.rotation(1, 0), frame.rotation(0, 0)) - o.open_rad;
       const Eigen::Vector3d hinge = frame * Eigen::Vector3d(part->first + 0.01, 0.0, 0.0);
@@ -64,11 +69,11 @@ Ground::Ground(const Scene& scene, double floor) {
     if (signed_area(out) < 0.0) std::reverse(out.begin(), out.end());
     return out;
   };
-
   const auto is_floor = [&](const Face& face) {
     return face.normal.z() > 0.99 && std::abs(face.origin.z() - floor) < 0.03;
   };
 
+  // Extent of the floor and of the paths.
   Eigen::AlignedBox2d box;
   for (const Face& face : scene.faces) {
     if (!is_floor(face)) continue;
@@ -90,6 +95,7 @@ Ground::Ground(const Scene& scene, double floor) {
     if (is_floor(face)) fill(free_, outline(face), 1);
   }
 
+  // Surfaces at body height are obstacles.
   for (const Face& face : scene.faces) {
     double low = 1e9, high = -1e9;
     for (const Vector2d& uv : face.polygon) {
@@ -99,9 +105,10 @@ Ground::Ground(const Scene& scene, double floor) {
     }
 
     if (high < 0.1 || low > 1.8) continue;
-
     const std::vector<Vector2d> corners = outline(face);
     fill(free_, corners, 0);
+
+    // Upright faces have no area, but edges.
     for (std::size_t i = 0; i < corners.size(); ++i) {
       const Vector2d edge = corners[(i + 1) % corners.size()] - corners[i];
       const int steps = 1 + static_cast<int>(2.0 * edge.norm() / kCell);
@@ -124,6 +131,7 @@ void Ground::fill(cv::Mat1b& grid, const std::vector<Vector2d>& outline, uchar v
     box.extend(outline[i]);
   }
 
+  // Cells with their middle inside.
   const cv::Rect part =
       cv::Rect(cell_of(box.min()), cell_of(box.max()) + cv::Point(1, 1)) & cv::Rect({0, 0}, grid.size());
   for (int y = part.y; y < part.y + part.height; ++y) {
@@ -149,6 +157,7 @@ bool Ground::is_free(const std::vector<Vector2d>& outline) const {
 Ground furnished_ground(const Plan& plan, int storey) {
   Ground ground(plan, storey);
   for (const PlanThing& thing : plan.things) {
+    // Tall things hide the view.
     if (plan.rooms[static_cast<std::size_t>(thing.room)].storey == storey)
       ground.block(thing.outline, thing.top - thing.bottom > 1.4);
   }
@@ -184,6 +193,7 @@ double Ground::clearance(const Vector2d& a, const Vector2d& b) const {
 }
 
 bool Ground::in_sight(const Vector2d& a, const Vector2d& b) const {
+  // About one sample per cell.
   const int steps = 1 + static_cast<int>((b - a).norm() / kCell);
   for (int i = 0; i <= steps; ++i) {
     const cv::Point c = cell_of(a + static_cast<double>(i) / steps * (b - a));
@@ -216,6 +226,7 @@ cv::Mat1b Ground::reachable(const Vector2d& from) const { return flood(distance_
 
 bool Ground::try_block(const std::vector<Vector2d>& outline, bool hides_view,
                        const std::vector<Vector2d>& room, const std::vector<Vector2d>& ways, double least) {
+  // The room and its surroundings suffice.
   std::vector<cv::Point> corners;
   corners.reserve(room.size());
   for (const Vector2d& p : room) corners.push_back(cell_of(p));
@@ -224,15 +235,18 @@ bool Ground::try_block(const std::vector<Vector2d>& outline, bool hides_view,
   const cv::Rect part =
       (box + cv::Size(2 * margin, 2 * margin) - cv::Point(margin, margin)) & cv::Rect({0, 0}, free_.size());
 
+  // Blocked on trial.
   const cv::Mat1b before = free_(part).clone();
   fill(free_, outline, 0);
 
+  // Clearance to obstacles.
   cv::Mat1b inside(free_.size(), uchar{0});
   fill(inside, room, 1);
   cv::Mat1f distance;
   cv::distanceTransform(free_(part), distance, cv::DIST_L2, cv::DIST_MASK_PRECISE);
   distance *= kCell;
 
+  // The ways into the room must stay connected.
   bool connected = !ways.empty();
   cv::Mat1b known;
   for (const Vector2d& way : ways) {
@@ -241,6 +255,7 @@ bool Ground::try_block(const std::vector<Vector2d>& outline, bool hides_view,
     connected = connected && known(c) != 0;
   }
 
+  // Undone if too little stays reachable.
   if (!connected || cv::countNonZero(known & inside(part)) < least * cv::countNonZero(inside)) {
     before.copyTo(free_(part));
     return false;
@@ -262,14 +277,16 @@ std::vector<Vector2d> Ground::way(const Vector2d& from, const Vector2d& to) cons
   const cv::Point start = cell_of(from), goal = cell_of(to);
   if (!walkable(start) || !walkable(goal)) return {};
 
+  // A*, bounded by the straight distance.
   const int columns = free_.cols;
   cv::Mat1f cost(free_.size(), 1e9F);
   cv::Mat1i before(free_.size(), -1);
   std::priority_queue<Entry> open;
+
+  // A cheaper way to a cell replaces the known one.
   const auto push = [&](const cv::Point& c, float value, int from_cell) {
     if (value >= cost(c)) return;
     cost(c) = value;
-
     before(c) = from_cell;
     const auto d = goal - c;
     open.push(
@@ -285,6 +302,7 @@ std::vector<Vector2d> Ground::way(const Vector2d& from, const Vector2d& to) cons
     if (top.cost > cost(c)) continue;
     if (c == goal) break;
 
+    // Eight neighbours; narrow places cost more.
     for (int k = 0; k < 9; ++k) {
       const cv::Point n(c.x + k % 3 - 1, c.y + k / 3 - 1);
       if (k == 4 || !walkable(n)) continue;
@@ -293,6 +311,7 @@ std::vector<Vector2d> Ground::way(const Vector2d& from, const Vector2d& to) cons
     }
   }
 
+  // Back from the goal.
   std::vector<Vector2d> way;
   if (cost(goal) >= 1e9F) return way;
   for (int cell = goal.y * columns + goal.x; cell >= 0; cell = before(cell / columns, cell % columns))
@@ -307,6 +326,7 @@ std::vector<Vector2d> Ground::straight_way(const Vector2d& from, const Vector2d&
   if (cells.empty()) return {};
   std::vector<Vector2d> corners = {cells.front()};
   for (std::size_t i = 0; i + 1 < cells.size();) {
+    // The farthest cell in line with enough clearance.
     std::size_t best = i + 1;
     double narrow = 1.0;
     for (std::size_t j = i + 1; j < cells.size() && (cells[j] - cells[i]).norm() < 2.0; ++j) {

@@ -20,7 +20,7 @@ class Ground {
   /// The floor of any scene at a height: nothing stands on it or hangs lower than people are high.
   Ground(const Scene& scene, double floor);
 
-  /// Takes cells away; recompute() brings the distances up to date.
+  /// Marks cells as occupied; recompute() brings the distances up to date.
   void block(const std::vector<Eigen::Vector2d>& outline, bool hides_view);
   void unblock(const std::vector<Eigen::Vector2d>& outline);
   void recompute();
@@ -54,7 +54,7 @@ class Ground {
   [[nodiscard]] cv::Size size() const { return free_.size(); }
 
  private:
-  /// Cells whose middles lie in an outline.
+  /// Cells with their middles in an outline.
   void fill(cv::Mat1b& grid, const std::vector<Eigen::Vector2d>& outline, uchar value) const;
   Eigen::Vector2d origin_;
   cv::Mat1b free_;      ///< 1: nothing stands there

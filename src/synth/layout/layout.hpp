@@ -31,7 +31,7 @@ struct BuildingFrame {
 /// Cells of one storey.
 Subdivision draw_storey(const BuildingFrame& frame, int rooms, int alike, bool hall, Rng& rng);
 
-/// A building of several storeys with stairs; nothing if it did not come out.
+/// A building of several storeys with stairs; nothing if this attempt failed.
 bool build_building(const SynthOptions& options, std::uint64_t seed, Scene& scene, Plan& plan);
 
 /// The shaft of a lift and the lobbies before it, which are open to the corridor at the largest y.

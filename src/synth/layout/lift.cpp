@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A lift in place of a building's stairs. Its cab has no door of its own: who rides sees the shaft pass by.
+// A lift in place of a building's stairs. Its cab has no door, so that a rider sees the shaft pass by.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -50,19 +50,23 @@ void build_lift_storey(const LiftShaft& shaft, int index, bool lowest, bool high
   const double m = shaft.middle(), y = shaft.door - kFront, top = highest ? height : height - kSlab;
   const Vector2d low = shaft.box.min(), high = shaft.box.max();
 
+  // The shaft stays open above the lowest floor.
   b.begin_object("floor", fmt::format("floor of lift {}", index), mark);
   solid({low.x(), lowest ? low.y() : y, -kSlab}, {high.x(), high.y(), 0.0}, "tiles");
 
+  // The front, with an opening for the door.
   b.begin_object("wall", fmt::format("front of lift {}", index), mark);
   solid({low.x(), y, 0.0}, {m - kHalf, shaft.door, top}, "paint_blue");
   solid({m + kHalf, y, 0.0}, {high.x(), shaft.door, top}, "paint_blue");
   solid({m - kHalf, y, kHead}, {m + kHalf, shaft.door, top}, "paint_blue");
 
+  // A sign and a lamp in the lobby.
   b.begin_object("sign", fmt::format("sign of lift {}", index), mark);
-  add_panel(b, upright({m + kHalf + 0.45, shaft.door, 1.5}, M_PI), 0.5, 0.7, 0.02, "sign", "metal", false);
+  add_panel(b, upright({m + kHalf + 0.45, shaft.door, 1.5}, M_PI), {0.5, 0.7, 0.02, "sign", "metal", false});
   b.begin_object("lamp", "", mark);
   add_ceiling_lamp(b, upright({m, 0.5 * (shaft.door + high.y()), top}, 0.0), 0.5, 0.5, 9.0);
 
+  // The shaft ends at the top.
   if (!highest) return;
   b.begin_object("ceiling", fmt::format("ceiling of lift {}", index), mark);
   b.polygon({{low.x(), high.y(), top},
@@ -95,9 +99,10 @@ void add_lift(const LiftShaft& shaft, const std::vector<double>& storeys, Scene&
   b.box({}, {left - wall, back, 0.0}, {left, y - 0.02, kCabHeight}, {"wood"});
   b.box({}, {right, back, 0.0}, {right + wall, y - 0.02, kCabHeight}, {"wood"});
   b.box({}, {left, back - wall, 0.0}, {right, back, kCabHeight}, {"metal"});
-  add_panel(b, upright({m, back, 1.5}, M_PI), 0.7, 0.9, 0.02, "poster", "wood_dark", false);
+  add_panel(b, upright({m, back, 1.5}, M_PI), {0.7, 0.9, 0.02, "poster", "wood_dark", false});
   moves("lift", first, {0.0, 0.0, storeys.back()});
 
+  // Two leaves on every storey, built shut.
   for (std::size_t k = 0; k < storeys.size(); ++k) {
     for (const double side : {-1.0, 1.0}) {
       first = scene.faces.size();
@@ -114,6 +119,8 @@ void add_lift(const LiftShaft& shaft, const std::vector<double>& storeys, Scene&
 std::vector<Vector3d> lift_ride(const LiftShaft& shaft, double from, double to) {
   const double m = shaft.middle(), front = shaft.door - kFront, middle = 0.5 * (front + shaft.back());
   std::vector<Vector3d> out = {{m, shaft.door + 0.6, from}, {m, front - 0.3, from}, {m - 0.25, middle, from}};
+
+  // Small sideways motion during the ride.
   constexpr int kPieces = 6;
   for (int i = 0; i <= kPieces; ++i) {
     const double s = static_cast<double>(i) / kPieces;
@@ -148,6 +155,7 @@ void run_lift(const SynthOptions& options, const CameraPath& path, Scene& scene)
     inside.push_back(box.min().x() < at.x() && at.x() < box.max().x() && at.y() < box.max().y() &&
                      at.y() > box.min().y());
 
+    // The cab follows the camera inside.
     welcome.push_back((at - Vector2d(box.center().x(), box.max().y())).norm() < kWelcome);
     cab->shares.push_back(inside.back() != 0 ? floors.back() / storeys.back() : cab->shares.back());
   }

@@ -13,12 +13,15 @@ namespace plumbline::synth {
 using Eigen::Vector2d;
 
 double MovingDoor::angle(double t) const {
+  // Sampled values are interpolated.
   if (!shares.empty()) {
     const double at = std::clamp(t / kShareStep, 0.0, static_cast<double>(shares.size() - 1));
     const auto i = std::min(static_cast<std::size_t>(at), shares.size() - 2);
     const double s = at - static_cast<double>(i);
     return (1.0 - s) * shares[i] + s * shares[i + 1];
   }
+
+  // Otherwise smoothly there, held, and back.
   const auto next = std::upper_bound(starts.begin(), starts.end(), t);
   if (next == starts.begin()) return rest_rad;
   const double since = t - *std::prev(next);
@@ -80,6 +83,7 @@ double free_angle(const Scene& scene, std::size_t index, const PlanOpening& open
     if ((other.hinge.head<2>() - hinge).norm() < both) return 0.0;
   }
 
+  // In tenths of the leaf, angle by angle.
   for (int step = 0; step <= 20; ++step) {
     const double angle = step * kAngleStep;
     const Vector2d along = Eigen::Rotation2Dd(leaf.open_rad - angle) * reach;
@@ -114,6 +118,8 @@ void plan_swings(const std::vector<std::vector<Eigen::Vector3d>>& all, const Eig
                  double reach, MovingDoor& door, Rng& rng) {
   door.swing = rng.uniform(1.0, 2.2);
   door.hold = rng.uniform(1.0, 5.0);
+
+  // Times with a camera near the door.
   std::vector<char> near;
   for (const auto& places : all) {
     near.resize(std::max(near.size(), places.size()), 0);
@@ -123,6 +129,7 @@ void plan_swings(const std::vector<std::vector<Eigen::Vector3d>>& all, const Eig
     }
   }
 
+  // Swings begin in gaps that are long enough.
   const auto length = static_cast<std::size_t>((2.0 * door.swing + door.hold) / kLookStep) + 2;
   auto at = static_cast<std::size_t>(rng.uniform(0.5, 6.0) / kLookStep);
   while (at + length <= near.size()) {
@@ -131,6 +138,8 @@ void plan_swings(const std::vector<std::vector<Eigen::Vector3d>>& all, const Eig
       at += 5;
       continue;
     }
+
+    // The next swing comes after a pause.
     door.starts.push_back(static_cast<double>(at) * kLookStep);
     at += length + static_cast<std::size_t>(rng.uniform(2.0, 12.0) / kLookStep);
   }
@@ -184,6 +193,7 @@ std::vector<MovingDoor> drawers(const std::vector<std::vector<Eigen::Vector3d>>&
                  {Eigen::Vector3d(-0.2, -out - 0.08, -0.1), Eigen::Vector3d(0.2, 0.0, 0.1)}))
       continue;
 
+    // The drawer slides out of the desk.
     door.drawer = "drawer of " + scene.objects[static_cast<std::size_t>(object)].name;
     door.leaf = scene.leaves.size();
     door.opening = -1;
@@ -191,6 +201,7 @@ std::vector<MovingDoor> drawers(const std::vector<std::vector<Eigen::Vector3d>>&
     door.slide = -out * in;
     frame.translation += door.slide;
 
+    // Its box, which is hidden while it is shut.
     Scene box;
     Builder(box).box(frame, {-0.19, 0.01, -0.08}, {0.19, 0.34, 0.06}, {"cardboard"});
     for (Face& face : box.faces) face.object = object;
@@ -236,6 +247,7 @@ void choose_moving_doors(const SynthOptions& options, Scene& scene) {
     door.opening = static_cast<int>(i);
     if (o.back < 0 || door.leaf >= scene.leaves.size()) continue;
 
+    // From rest to nearly shut, or to wide open.
     const DoorLeaf& leaf = scene.leaves[door.leaf];
     const double most = free_angle(scene, door.leaf, o);
     door.rest_rad = leaf.open_rad;

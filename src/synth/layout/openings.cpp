@@ -77,6 +77,8 @@ class Openings {
     const double lowest = lowest_ceiling(s), length = s.to - s.from - 2.0 * kStub;
     const bool corridors = kind(s.front) == "corridor" && kind(s.back) == "corridor";
     const bool wide = corridors || (rng_.chance(0.12) && length > 1.6);
+
+    // A passage without a leaf.
     if (wide && length > 1.0) {
       const double width = corridors ? length - 1e-6 : rng_.uniform(1.2, std::min(length, 3.0));
       if (PlanOpening* o = place(s, width, OpeningKind::kPassage)) {
@@ -85,6 +87,7 @@ class Openings {
       }
     }
 
+    // A door, sometimes of double width.
     const double width =
         std::min(length, rng_.chance(0.15) ? rng_.uniform(1.2, 1.8) : rng_.uniform(0.7, 1.05));
     PlanOpening* o = width < 0.7 ? nullptr : place(s, width, OpeningKind::kDoor);
@@ -109,6 +112,7 @@ class Openings {
     }
   }
 
+  /// A recess from one side of the wall.
   void add_niche(const Stretch& s) {
     if (PlanOpening* o = place(s, rng_.uniform(0.4, 1.1), OpeningKind::kNiche)) {
       o->back = -1;
@@ -165,6 +169,8 @@ bool connect_rooms(Rng& rng, const Plan& plan, Openings& openings) {
   const std::vector<Stretch> stretches = inner_stretches(plan);
   std::vector<double> weights;
   std::vector<char> used(stretches.size(), 0), reached(plan.rooms.size(), 0);
+
+  // Corridors and living rooms come first.
   for (const Stretch& s : stretches) {
     const auto& front = plan.rooms[static_cast<std::size_t>(s.front)].kind;
     const auto& back = plan.rooms[static_cast<std::size_t>(s.back)].kind;
@@ -172,8 +178,8 @@ bool connect_rooms(Rng& rng, const Plan& plan, Openings& openings) {
     weights.push_back(rng.uniform() - halls - (front == "living" || back == "living" ? 0.6 : 0.0));
   }
 
+  // Prim's algorithm, from the first room on.
   reached[0] = 1;
-
   for (std::size_t count = 1; count < plan.rooms.size();) {
     std::size_t best = stretches.size();
     for (std::size_t i = 0; i < stretches.size(); ++i) {
@@ -182,6 +188,7 @@ bool connect_rooms(Rng& rng, const Plan& plan, Openings& openings) {
       if (crosses && used[i] == 0 && (best == stretches.size() || weights[i] < weights[best])) best = i;
     }
 
+    // The lightest edge that leaves the tree.
     if (best == stretches.size()) return false;
     used[best] = 1;
     if (!openings.connect(stretches[best], true)) continue;
@@ -190,6 +197,7 @@ bool connect_rooms(Rng& rng, const Plan& plan, Openings& openings) {
     ++count;
   }
 
+  // Further openings close loops.
   for (std::size_t i = 0; i < stretches.size(); ++i) {
     const Stretch& s = stretches[i];
     const bool corridors = weights[i] < -1.0;
@@ -230,6 +238,7 @@ bool add_openings(Rng& rng, Plan& plan) {
   Openings openings(rng, plan);
   if (!connect_rooms(rng, plan, openings)) return false;
 
+  // One entrance, from a corridor or living room.
   bool entrance = false;
   for (std::size_t i = 0; i < plan.rooms.size(); ++i) {
     const std::string kind = plan.rooms[i].kind;
@@ -237,6 +246,7 @@ bool add_openings(Rng& rng, Plan& plan) {
       const PlanWall& wall = plan.walls[static_cast<std::size_t>(face.wall)];
       if (!wall.outer) continue;
 
+      // The entrance is in the first wall long enough.
       const auto [from, to] = extent(wall, face);
       const Stretch stretch{face.wall, from, to, static_cast<int>(i), -1};
       if (!entrance && (kind == "corridor" || kind == "living") && to - from > 1.3) {
@@ -244,6 +254,7 @@ bool add_openings(Rng& rng, Plan& plan) {
         entrance = true;
       }
 
+      // Windows by the length of the wall.
       for (int k = static_cast<int>((to - from) / 2.4); k > 0; --k) {
         if (rng.chance(kind == "store" || kind == "bath" ? 0.3 : 0.8)) openings.add_window(stretch);
       }
@@ -258,6 +269,8 @@ bool add_openings(Rng& rng, Plan& plan) {
 bool connected(const Plan& plan) {
   std::vector<char> reached(plan.rooms.size(), 0);
   reached[0] = 1;
+
+  // Each round reaches one opening farther.
   for (std::size_t round = 0; round < plan.rooms.size(); ++round) {
     for (const PlanOpening& o : plan.openings) {
       if (!o.passable()) continue;
@@ -284,12 +297,14 @@ bool make_alike(Plan& plan) {
            wall != room(first).faces[1].wall && wall != room(first).faces[3].wall;
   };
 
+  // Openings that all rooms alike can have, and those elsewhere.
   std::vector<PlanOpening> kept;
   for (const PlanOpening& o : plan.openings) {
     const bool of_first = o.front == first || o.back == first;
     if (of_first ? common(o.wall) : !is_alike(o.front) && !is_alike(o.back)) kept.push_back(o);
   }
 
+  // Each other room gets copies.
   const std::size_t count = kept.size();
   for (const int other : plan.alike) {
     if (other == first) continue;
@@ -299,6 +314,8 @@ bool make_alike(Plan& plan) {
       PlanOpening o = kept[i];
       if (o.front != first && o.back != first) continue;
       const double along = plan.walls[static_cast<std::size_t>(o.wall)].direction.dot(shift);
+
+      // Moved along the wall to the other room.
       o.from += along;
       o.to += along;
       (o.front == first ? o.front : o.back) = other;

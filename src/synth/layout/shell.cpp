@@ -21,6 +21,8 @@ std::optional<std::pair<double, double>> part_of_face(const Plan& plan, int room
                                                       const PlanOpening& o) {
   if (o.wall != face.wall || (o.front != room && o.back != room)) return std::nullopt;
   const PlanWall& wall = plan.walls[static_cast<std::size_t>(o.wall)];
+
+  // Positions along the face, from its end.
   const Vector2d e = (face.from - face.to).normalized();
   const auto x = [&](double s) { return e.dot(wall.at(s) - face.to); };
   const auto [x0, x1] = std::minmax({x(o.from), x(o.to)});
@@ -60,6 +62,7 @@ std::vector<std::vector<Vector2d>> convex_parts(const std::vector<Vector2d>& out
     }
     if (edge == n) continue;
 
+    // Two parts along the continued wall.
     std::vector<Vector2d> first = {at}, second = {at + nearest * d};
     for (std::size_t k = 1; k <= edge; ++k) first.push_back(outline[(i + k) % n]);
     first.push_back(at + nearest * d);
@@ -82,6 +85,7 @@ class Shell {
  public:
   Shell(const Plan& plan, Builder& builder) : plan_(plan), b_(builder) {}
 
+  /// Walls, floor, ceiling and lamps of one room.
   void add_room(int index, Rng& rng) {
     const PlanRoom& room = plan_.rooms[static_cast<std::size_t>(index)];
     const std::string name = fmt::format("{} {}", room.kind, index);
@@ -91,6 +95,8 @@ class Shell {
     }
 
     if (room.kind == "stairs") return;  // floors and lamps are the stairs' own
+
+    // Faces must be convex.
     const auto parts = convex_parts(room.outline());
     for (const bool floor : {true, false}) {
       b_.begin_object(floor ? "floor" : "ceiling", fmt::format("{} of {}", floor ? "floor" : "ceiling", name),
@@ -98,16 +104,17 @@ class Shell {
       for (std::vector<Vector2d> part : parts) {
         if (!floor) std::reverse(part.begin(), part.end());
 
+        // Textures continue over all parts.
         std::vector<Vector3d> corners;
         for (const Vector2d& p : part) corners.emplace_back(p.x(), p.y(), floor ? 0.0 : room.height);
         b_.polygon(corners, Vector3d::UnitX(), {floor ? room.floor_material : "ceiling"});
         b_.anchor(b_.scene().faces.back(), Vector3d(0.0, 0.0, corners[0].z()));
       }
     }
-
     for (const auto& part : parts) add_lamps(part, room, rng);
   }
 
+  /// An opening is built from its front room.
   void add_opening(const PlanOpening& o) {
     for (const PlanFace& face : plan_.rooms[static_cast<std::size_t>(o.front)].faces) {
       const auto part = part_of_face(plan_, o.front, face, o);
@@ -130,7 +137,9 @@ class Shell {
     b_.polygon(world, world[1] - world[0], skin);
   }
 
+  /// A wall's face around its openings.
   void add_face(int room, const PlanFace& face, const std::string& material) {
+    // Openings in order along the face.
     std::vector<Part> parts;
     for (const PlanOpening& o : plan_.openings) {
       if (const auto part = part_of_face(plan_, room, face, o))
@@ -138,6 +147,7 @@ class Shell {
     }
     std::sort(parts.begin(), parts.end(), [](const Part& a, const Part& b) { return a.x0 < b.x0; });
 
+    // A rectangle, with skirting if it meets the floor.
     const Rigid3 f = face_frame(face);
     const double length = (face.from - face.to).norm();
     const auto piece = [&](double x0, double x1, double z0, double z1) {
@@ -146,22 +156,25 @@ class Shell {
       b_.anchor(b_.scene().faces.back(), f.translation);
       if (z0 > 0.0 || z1 < 0.3) return;
 
+      // Skirting stands out and has an upper side.
       const double out = 0.008, u0 = x0 > 0.0 ? x0 : out, u1 = x1 < length ? x1 : length - out;
       quad(f, {{u0, -out, 0.0}, {u1, -out, 0.0}, {u1, -out, 0.07}, {u0, -out, 0.07}}, {"paint_white"});
       quad(f, {{u0, -out, 0.07}, {u1, -out, 0.07}, {u1, 0.0, 0.07}, {u0, 0.0, 0.07}}, {"paint_white"});
     };
 
+    // Between the openings, below and above them.
     const double height = plan_.rooms[static_cast<std::size_t>(room)].height;
     double x = 0.0;
     for (const Part& part : parts) {
       piece(x, part.x0, 0.0, height);
       piece(part.x0, part.x1, 0.0, part.opening->sill);
       piece(part.x0, part.x1, part.opening->head, height);
-
       if (part.opening->kind == OpeningKind::kDoor || part.opening->kind == OpeningKind::kWindow)
         add_casing(f, part);
       x = part.x1;
     }
+
+    // The rest of the face.
     piece(x, length, 0.0, height);
   }
 
@@ -182,15 +195,18 @@ class Shell {
     const std::string jamb = framed ? "paint_white" : room.wall_material;
     const double y = o.kind == OpeningKind::kWindow ? 0.5 * o.depth : o.depth, z0 = o.sill, z1 = o.head;
 
+    // Both jambs, sill and head.
     quad(f, {{x0, 0.0, z0}, {x0, y, z0}, {x0, y, z1}, {x0, 0.0, z1}}, {jamb});
     quad(f, {{x1, y, z0}, {x1, 0.0, z0}, {x1, 0.0, z1}, {x1, y, z1}}, {jamb});
     quad(f, {{x0, 0.0, z0}, {x1, 0.0, z0}, {x1, y, z0}, {x0, y, z0}},
          {z0 > 0.0 ? jamb : std::string(room.floor_material)});
     quad(f, {{x0, y, z1}, {x1, y, z1}, {x1, 0.0, z1}, {x0, 0.0, z1}}, {jamb});
 
+    // A niche has a back.
     const bool ends_there = o.back < 0 && o.kind != OpeningKind::kWindow;
     if (ends_there) quad(f, {{x0, y, z0}, {x1, y, z0}, {x1, y, z1}, {x0, y, z1}}, {jamb});
 
+    // Glass and leaves are those of scene files.
     Wall wall;
     wall.thickness = o.depth;
     Opening part;
@@ -200,6 +216,7 @@ class Shell {
     part.height = z1 - z0;
     part.open_rad = o.open_rad;
 
+    // Coordinates of scene files begin in the wall's middle.
     const Rigid3 middle = placed(f, {0.0, 0.5 * o.depth, 0.0}, {0.0, Vector3d::UnitZ()});
     if (o.kind == OpeningKind::kWindow) add_glass(b_, middle, part);
     if (o.leaf == Leaf::kSliding) {
@@ -242,6 +259,7 @@ void build_shell(const Plan& plan, Rng& rng, Builder& builder) {
     for (std::size_t i = to; i < faces.size(); ++i) faces[i].seed = faces[from + i - to].seed;
   };
 
+  // Rooms alike repeat the first one's random numbers.
   std::size_t first = 0;
   Rng first_rng = rng;
   for (std::size_t i = 0; i < plan.rooms.size(); ++i) {
@@ -260,6 +278,7 @@ void build_shell(const Plan& plan, Rng& rng, Builder& builder) {
     if (copy) adopt(first, begin);
   }
 
+  // Openings alike repeat textures.
   std::vector<std::size_t> begins;
   for (const PlanOpening& o : plan.openings) {
     begins.push_back(faces.size());

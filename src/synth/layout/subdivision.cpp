@@ -31,6 +31,7 @@ double PlanRoom::area() const { return signed_area(outline()); }
 bool PlanRoom::contains(const Vector2d& p) const {
   bool inside = false;
   for (const PlanFace& f : faces) {
+    // Parity of the edges crossed by a ray.
     if ((f.from.y() > p.y()) == (f.to.y() > p.y())) continue;
     const double share = (p.y() - f.from.y()) / (f.to.y() - f.from.y());
     if (p.x() < f.from.x() + share * (f.to.x() - f.from.x())) inside = !inside;
@@ -49,6 +50,8 @@ Subdivision::Subdivision(const Vector2d& size, double thickness) {
 int Subdivision::insert_point(int a, int b, const Vector2d& p) {
   const int point = static_cast<int>(points_.size());
   points_.push_back(p);
+
+  // Cells on both sides of the edge get the point.
   for (Cell& cell : cells) {
     for (std::size_t i = 0; i < cell.points.size(); ++i) {
       const int from = cell.points[i], to = cell.points[next(i, cell.points.size())];
@@ -70,6 +73,7 @@ std::optional<int> Subdivision::split(int index, const Vector2d& point, const Ve
     return std::abs(d) < kSnap ? 0.0 : d;
   };
 
+  // New corners on the crossed edges.
   const std::vector<int> before = cells[static_cast<std::size_t>(index)].points;
   for (std::size_t i = 0; i < before.size(); ++i) {
     const int a = before[i], b = before[next(i, before.size())];
@@ -80,12 +84,15 @@ std::optional<int> Subdivision::split(int index, const Vector2d& point, const Ve
     insert_point(a, b, pa + da / (da - db) * (pb - pa));
   }
 
+  // Corners on either side of the line.
   const Cell whole = cells[static_cast<std::size_t>(index)];
   const int wall = static_cast<int>(walls.size());
   Cell left, right;
   left.kind = right.kind = whole.kind;
   for (std::size_t i = 0; i < whole.points.size(); ++i) {
     const double here = side(whole.points[i]), there = side(whole.points[next(i, whole.points.size())]);
+
+    // Corners on the line belong to both sides.
     if (here >= 0.0) {
       left.points.push_back(whole.points[i]);
       left.walls.push_back(here == 0.0 && there < 0.0 ? wall : whole.walls[i]);
@@ -97,6 +104,7 @@ std::optional<int> Subdivision::split(int index, const Vector2d& point, const Ve
     }
   }
 
+  // A line that only touches divides nothing.
   if (left.points.size() < 3 || right.points.size() < 3) return std::nullopt;
   walls.push_back({point, unit, thickness, false});
   cells[static_cast<std::size_t>(index)] = right;
@@ -106,6 +114,8 @@ std::optional<int> Subdivision::split(int index, const Vector2d& point, const Ve
 
 bool Subdivision::merge(int into, int from) {
   Cell &a = cells[static_cast<std::size_t>(into)], &b = cells[static_cast<std::size_t>(from)];
+
+  // Edges of both cells, with their direction.
   std::map<std::pair<int, int>, int> edges;
   for (const Cell* cell : {&a, &b}) {
     for (std::size_t i = 0; i < cell->points.size(); ++i) {
@@ -113,6 +123,7 @@ bool Subdivision::merge(int into, int from) {
     }
   }
 
+  // Shared edges cancel.
   std::map<int, std::pair<int, int>> after;  // of a point: the next one and the wall to it
   double shared = 0.0;
   for (const auto& [edge, wall] : edges) {
@@ -128,15 +139,16 @@ bool Subdivision::merge(int into, int from) {
   constexpr double kLeastShared = 1.4;  // m: less would leave a gap between two rooms
   if (shared < kLeastShared) return false;
 
+  // The outline, in one round.
   Cell merged;
   merged.kind = a.kind;
   const int first = after.begin()->first;
-
   for (int at = first; merged.points.empty() || at != first; at = after.at(at).first) {
     merged.points.push_back(at);
     merged.walls.push_back(after.at(at).second);
   }
 
+  // A second outline would be a hole.
   if (merged.points.size() != after.size()) return false;
   a = std::move(merged);
   b = {};
@@ -152,6 +164,7 @@ std::optional<std::vector<PlanFace>> Subdivision::faces(const Cell& cell) const 
   std::vector<Run> runs;
   const std::size_t n = cell.points.size();
 
+  // A face for each run along one wall.
   for (std::size_t i = 0; i < n; ++i) {
     if (cell.walls[i] == cell.walls[i == 0 ? n - 1 : i - 1]) continue;
     const Vector2d& a = points_[static_cast<std::size_t>(cell.points[i])];
@@ -161,6 +174,7 @@ std::optional<std::vector<PlanFace>> Subdivision::faces(const Cell& cell) const 
     runs.push_back({wall.origin + 0.5 * wall.thickness * Vector2d(-d.y(), d.x()), d, cell.walls[i]});
   }
 
+  // Corners where successive faces meet.
   std::vector<PlanFace> faces;
   for (std::size_t i = 0; i < runs.size(); ++i) {
     const Run &before = runs[i == 0 ? runs.size() - 1 : i - 1], &run = runs[i];
@@ -171,6 +185,7 @@ std::optional<std::vector<PlanFace>> Subdivision::faces(const Cell& cell) const 
     faces.push_back({corner, corner, run.wall});
   }
 
+  // Faces must keep a length and a direction.
   for (std::size_t i = 0; i < faces.size(); ++i) {
     faces[i].to = faces[next(i, faces.size())].from;
     if (runs[i].direction.dot(faces[i].to - faces[i].from) < 0.3) return std::nullopt;

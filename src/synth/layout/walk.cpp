@@ -22,6 +22,8 @@ double heading(const Vector2d& d) { return std::atan2(d.y(), d.x()); }
 /// Free places in a room, far from each other: one for every 6 m^2.
 std::vector<Vector2d> stations(const PlanRoom& room, const Ground& ground, const cv::Mat1b& reachable) {
   std::vector<Vector2d> candidates, chosen;
+
+  // Reachable places on a coarse grid.
   for (int y = 0; y < ground.size().height; y += 3) {
     for (int x = 0; x < ground.size().width; x += 3) {
       const Vector2d p = ground.middle_of({x, y});
@@ -29,6 +31,7 @@ std::vector<Vector2d> stations(const PlanRoom& room, const Ground& ground, const
     }
   }
 
+  // Greedy choice of distant places.
   const auto count = static_cast<std::size_t>(std::clamp(room.area() / 6.0, 2.0, 9.0));
   while (chosen.size() < count && !candidates.empty()) {
     const auto worth = [&](const Vector2d& p) {
@@ -37,6 +40,7 @@ std::vector<Vector2d> stations(const PlanRoom& room, const Ground& ground, const
       return nearest + 2.0 * std::min(0.7, ground.clearance(p));
     };
 
+    // Enough are chosen if the rest is crowded.
     const auto best =
         std::max_element(candidates.begin(), candidates.end(),
                          [&](const Vector2d& a, const Vector2d& b) { return worth(a) < worth(b); });
@@ -73,12 +77,15 @@ std::vector<Vector2d> round_off(const std::vector<Vector2d>& corners, const Grou
     const Vector2d d = corners[i + 1] - corners[i];
     const int n = static_cast<int>(std::ceil(d.norm() / 0.1));
     for (int k = 0; k < n; ++k) fine.push_back(corners[i] + static_cast<double>(k) / n * d);
+
+    // Corners in rooms to visit must not be cut.
     fixed.resize(fine.size(), 0);
     if (n > 0)
       fixed[fine.size() - static_cast<std::size_t>(n)] = std::any_of(
           keep.begin(), keep.end(), [&](const PlanRoom* room) { return room->contains(corners[i]); });
   }
 
+  // Smoothed in rounds, with clearance kept.
   for (int round = 0; round < 12; ++round) {
     for (std::size_t i = 0; i < fine.size(); ++i) {
       const Vector2d &before = fine[(i + fine.size() - 1) % fine.size()],
@@ -116,6 +123,7 @@ std::vector<const PlanRoom*> missed(const Plan& plan, const std::vector<Vector2d
 class Gaze {
  public:
   Gaze(const Plan& plan, const Ground& ground) : ground_(ground) {
+    // Points along the walls.
     for (std::size_t r = 0; r < plan.rooms.size(); ++r) {
       for (const PlanFace& face : plan.rooms[r].faces) {
         const Vector2d d = face.to - face.from, inwards = Vector2d(-d.y(), d.x()).normalized();
@@ -125,6 +133,7 @@ class Gaze {
       }
     }
 
+    // Jambs count three times as much.
     for (const PlanOpening& o : plan.openings) {
       const PlanWall& wall = plan.walls[static_cast<std::size_t>(o.wall)];
       const Vector2d left(-wall.direction.y(), wall.direction.x());
@@ -143,6 +152,7 @@ class Gaze {
       double yaw, worth;
     };
 
+    // Targets in range that face the camera.
     std::vector<Seen> around;
     for (std::size_t i = 0; i < targets_.size(); ++i) {
       const Vector2d d = targets_[i].at - at;
@@ -152,6 +162,7 @@ class Gaze {
       if (ground_.in_sight(at, targets_[i].at)) around.push_back({i, heading(d), targets_[i].worth});
     }
 
+    // A small turn, towards motion and unseen targets.
     double best = before, most = -1e9;
     for (int k = -4; k <= 4; ++k) {
       const double yaw = before + 0.12 * k;
@@ -167,6 +178,7 @@ class Gaze {
       }
     }
 
+    // Seen targets lose half their worth.
     for (const Seen& s : around) {
       if (std::abs(wrap(s.yaw - best)) < 0.45) targets_[s.target].worth *= 0.5;
     }
@@ -224,6 +236,7 @@ std::vector<std::vector<Vector2d>> lap(const Plan& plan, const std::vector<int>&
     if (first.size() < 4) first.push_back(place);
   }
 
+  // Three corridors make a lap.
   all = corridors.size() > 2 ? corridors : first;
   Vector2d middle = Vector2d::Zero();
   for (const Vector2d& p : all) middle += p / static_cast<double>(all.size());
@@ -245,6 +258,7 @@ std::vector<std::vector<Vector2d>> destinations(const Plan& plan, const Ground& 
                                  [](const PlanOpening& o) { return o.passable(); });
   if (door == plan.openings.end()) return {};
 
+  // Every room needs a free place.
   const cv::Mat1b reachable = ground.reachable(plan.middle(*door));
   std::vector<std::vector<Vector2d>> rooms, out;
   for (const PlanRoom& room : plan.rooms) {
@@ -254,6 +268,8 @@ std::vector<std::vector<Vector2d>> destinations(const Plan& plan, const Ground& 
 
   const auto& start = rooms[static_cast<std::size_t>(order.front())];
   if (route == Route::kLaps) return lap(plan, order, rooms);
+
+  // To the farthest room.
   if (route == Route::kThereAndBack) {
     Vector2d far = start.front();
     for (const auto& places : rooms) {
@@ -262,6 +278,7 @@ std::vector<std::vector<Vector2d>> destinations(const Plan& plan, const Ground& 
     return {{start.front()}, {far}};
   }
 
+  // Random places, or all of them room by room.
   if (route == Route::kWander) {
     for (int i = 0; i < 24; ++i) out.push_back({rng.pick(rng.pick(rooms))});
   } else {
@@ -277,6 +294,7 @@ RobotPath try_path(const Plan& plan, const Ground& ground, Route route, int robo
   path.speed = rng.uniform(0.55, 0.8);
   path.turn_rate = 0.8;
 
+  // Nearest place first within each group.
   std::vector<Vector2d> way;
   for (std::vector<Vector2d>& places : destinations(plan, ground, route, rng)) {
     if (way.empty()) way = {start.value_or(places.back())};
@@ -287,6 +305,7 @@ RobotPath try_path(const Plan& plan, const Ground& ground, Route route, int robo
             return (a - way.back()).norm() < (b - way.back()).norm();
           });
 
+      // The way there, around obstacles.
       const std::vector<Vector2d> leg = ground.straight_way(way.back(), *nearest);
       if (leg.empty()) return path;
       way.insert(way.end(), leg.begin(), leg.end());
@@ -295,12 +314,14 @@ RobotPath try_path(const Plan& plan, const Ground& ground, Route route, int robo
   }
   if (way.empty()) return path;
 
+  // Closed, with rounded corners.
   const std::vector<Vector2d> back = ground.straight_way(way.back(), way.front());
   way.insert(way.end(), back.begin(), back.end());
   std::vector<Vector2d> line = round_off(way, ground, {});
   if (const auto rooms = missed(plan, way, line); !rooms.empty()) line = round_off(way, ground, rooms);
   if (line.size() < 4) return path;
 
+  // Camera poses along the line.
   path.closed = true;
   path.waypoints = film(plan, line, ground, rng);
   return path;
@@ -310,6 +331,7 @@ RobotPath try_path(const Plan& plan, const Ground& ground, Route route, int robo
 
 RobotPath plan_path(const Plan& plan, const Ground& ground, Route route, int robot, Rng& rng,
                     const std::optional<Vector2d>& start) {
+  // A random path may come too close to obstacles.
   for (int tries = 0; tries < 6; ++tries) {
     RobotPath path = try_path(plan, ground, route, robot, rng, start);
     if (!path.waypoints.empty() && keeps_clear(path, ground)) return path;

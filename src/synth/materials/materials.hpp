@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Materials of surfaces: their look, and how they return a depth sensor's infrared light.
+// Materials of surfaces: their appearance, and how they return a depth sensor's infrared light.
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <string>

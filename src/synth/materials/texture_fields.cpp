@@ -20,12 +20,14 @@ cv::Mat1f fractal(cv::Size size, int cx, int cy, int octaves, float falloff, std
     const int px = cx << o, py = cy << o;
     if (px > size.width && py > size.height) break;
 
+    // Random values at the lattice's nodes.
     const std::uint64_t key = mix(seed + static_cast<std::uint64_t>(o));
     lattice.resize(static_cast<std::size_t>(px) * static_cast<std::size_t>(py));
     for (std::size_t i = 0; i < lattice.size(); ++i) {
       lattice[i] = gain * (static_cast<float>(mix(key ^ i) >> 40U) * 0x1.0p-23F - 1.0F);
     }
 
+    // Cell and weight of each column.
     const auto smooth = [](float t) { return t * t * (3.0F - 2.0F * t); };
     for (int x = 0; x < size.width; ++x) {
       const float u = static_cast<float>(x) * static_cast<float>(px) / static_cast<float>(size.width);
@@ -33,6 +35,7 @@ cv::Mat1f fractal(cv::Size size, int cx, int cy, int octaves, float falloff, std
       ease[static_cast<std::size_t>(x)] = smooth(u - std::floor(u));
     }
 
+    // Interpolation with smooth weights.
     for (int y = 0; y < size.height; ++y) {
       const float v = static_cast<float>(y) * static_cast<float>(py) / static_cast<float>(size.height);
       const int iy = std::min(py - 1, static_cast<int>(v));
@@ -50,6 +53,7 @@ cv::Mat1f fractal(cv::Size size, int cx, int cy, int octaves, float falloff, std
       }
     }
 
+    // Variances of octaves add up.
     sum += gain * gain;
     gain *= falloff;
   }

@@ -17,6 +17,8 @@ Canvas draw_plain(const Material& m, cv::Size size, std::uint64_t seed) {
 
 Canvas draw_plaster(const Material& m, cv::Size size, std::uint64_t seed) {
   Canvas canvas(size, tone(m));
+
+  // Stains, then marks of the roller.
   modulate(canvas, fractal(size, 2, 2, 4, 0.6F, seed), 0.03F);
   modulate(canvas, fractal(size, 64, 64, 3, 0.8F, seed + 50), 0.05F);  // roller marks
   Rng rng(seed, 1);
@@ -38,6 +40,8 @@ Canvas draw_ceiling(const Material& m, cv::Size size, std::uint64_t seed) {
                       static_cast<int>(rng.uniform(0, size.height)));
     cv::circle(canvas, c, rng.uniform() < 0.3 ? 1 : 0, scalar(tone(m) * rng.uniform(0.45, 0.8)), -1);
   }
+
+  // Joints between the boards.
   for (int i = 0; i < 2; ++i) {
     const int at = i * size.width / 2;
     cv::line(canvas, {at, 0}, {at, size.height}, scalar(tone(m) * 0.6F), 3);
@@ -48,6 +52,8 @@ Canvas draw_ceiling(const Material& m, cv::Size size, std::uint64_t seed) {
 
 Canvas draw_carpet(const Material& m, cv::Size size, std::uint64_t seed) {
   Canvas canvas(size, tone(m));
+
+  // Soft yarn of uneven colour.
   modulate(canvas, grain(size, seed), 0.45F);
   cv::GaussianBlur(canvas, canvas, {0, 0}, 0.8);
   modulate(canvas, fractal(size, 24, 24, 4, 0.8F, seed + 7), 0.22F);
@@ -92,6 +98,8 @@ Canvas draw_wood(const Material& m, cv::Size size, std::uint64_t seed) {
                   cv::LINE_AA);
     }
   }
+
+  // Fine pores over everything.
   modulate(canvas, grain(size, seed + 3), 0.05F);
   return canvas;
 }
@@ -103,6 +111,8 @@ Canvas draw_planks(const Material& m, cv::Size size, std::uint64_t seed) {
 
   for (int i = 0; i < rows; ++i) {
     const int y0 = i * step, y1 = i + 1 == rows ? size.height : y0 + step;
+
+    // Two boards per row, cut at random.
     const int cut = static_cast<int>(rng.uniform(0.2, 0.8) * size.width);
     const std::array<int, 3> ends = {0, cut, size.width};
     for (std::size_t k = 0; k < 2; ++k) {
@@ -111,6 +121,7 @@ Canvas draw_planks(const Material& m, cv::Size size, std::uint64_t seed) {
       cv::line(canvas, {ends[k], y0}, {ends[k], y1 - 1}, scalar(tone(m) * 0.25F), 2);
     }
 
+    // Joint above the row.
     cv::line(canvas, {0, y0}, {size.width, y0}, scalar(tone(m) * 0.25F), 2);
   }
 
@@ -119,6 +130,7 @@ Canvas draw_planks(const Material& m, cv::Size size, std::uint64_t seed) {
 }
 
 Canvas draw_brick(const Material& m, cv::Size size, std::uint64_t seed) {
+  // Mortar shows between the bricks.
   Canvas canvas(size, cv::Vec3f(0.50F, 0.53F, 0.55F));
   const int rows = 14;
   const double h = static_cast<double>(size.height) / rows, w = size.width / 4.0;
@@ -126,8 +138,11 @@ Canvas draw_brick(const Material& m, cv::Size size, std::uint64_t seed) {
 
   for (int i = 0; i < rows; ++i) {
     for (int k = 0; k < 4; ++k) {
+      // Every other row is offset by half a brick.
       const double x = (k + (i % 2) * 0.5) * w;
       const cv::Scalar color = scalar(tone(m) * rng.uniform(0.65, 1.3));
+
+      // Drawn twice, to continue at the opposite border.
       for (const double shift : {0.0, -static_cast<double>(size.width)}) {
         cv::rectangle(canvas, cv::Point2d(x + 3 + shift, i * h + 3),
                       cv::Point2d(x + w - 3 + shift, (i + 1) * h - 3), color, -1);
@@ -150,6 +165,7 @@ static void add_creases(cv::Mat1f& field, Rng& rng) {
     double angle = rng.uniform(0.0, M_PI);
     const double depth = rng.uniform(0.05, 0.13) * (rng.uniform() < 0.5 ? 1.0 : -1.0);
 
+    // Bends from piece to piece, fading.
     for (int k = 0; k < 5; ++k) {
       const cv::Point q =
           p + cv::Point(static_cast<int>(7 * std::cos(angle)), static_cast<int>(7 * std::sin(angle)));
@@ -159,6 +175,7 @@ static void add_creases(cv::Mat1f& field, Rng& rng) {
     }
   }
 
+  // Soft, as cloth is.
   cv::GaussianBlur(creases, creases, {0, 0}, 1.0);
   field += creases;
 }
@@ -178,6 +195,8 @@ static void add_hem(Canvas& canvas, double pixels_per_m, Rng& rng) {
 Canvas draw_cloth(const Material& m, cv::Size size, std::uint64_t seed) {
   Canvas canvas(size, tone(m));
   modulate(canvas, fractal(size, 3, 2, 3, 0.5F, seed), 0.02F);
+
+  // Folds sway and fade along their length.
   const cv::Mat1f sway = fractal(size, 3, 3, 3, 0.45F, seed + 20);
   const cv::Mat1f fade = fractal(size, 9, 3, 2, 0.5F, seed + 30);
 
@@ -201,6 +220,7 @@ Canvas draw_cloth(const Material& m, cv::Size size, std::uint64_t seed) {
 
   cv::Mat1f field(size, 0.0F);
 
+  // Profile of all folds at each pixel.
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       const float u = static_cast<float>(x) / static_cast<float>(size.width) + 0.018F * sway(y, x);
@@ -216,6 +236,7 @@ Canvas draw_cloth(const Material& m, cv::Size size, std::uint64_t seed) {
     }
   }
 
+  // Creases, weave, stains and hem.
   add_creases(field, rng);
   modulate(canvas, field, 1.0F);
   modulate(canvas, fractal(size, 128, 128, 3, 0.8F, seed + 40), 0.012F);
@@ -235,6 +256,7 @@ Canvas draw_fabric(const Material& m, cv::Size size, std::uint64_t seed) {
   Canvas canvas(size, tone(m));
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
+      // A checkered weave.
       const float weave = ((x / 3 + y / 3) % 2 == 0 ? 1.0F : -1.0F) * 0.08F;
       canvas(y, x) *= 1.0F + weave;
     }
@@ -254,6 +276,8 @@ Canvas draw_rug(const Material& m, cv::Size size, std::uint64_t seed) {
   for (int i = 0; i < cells; ++i) {
     for (int k = 0; k < cells; ++k) {
       const cv::Point c(i * step + step / 2, k * step + step / 2);
+
+      // Diamonds from the outside in.
       for (int ring = 3; ring >= 0; --ring) {
         const int r = step * (ring + 1) / 9;
         const std::vector<cv::Point> diamond = {c + cv::Point(r, 0), c + cv::Point(0, r), c - cv::Point(r, 0),
@@ -271,9 +295,13 @@ Canvas draw_rug(const Material& m, cv::Size size, std::uint64_t seed) {
 Canvas draw_door(const Material& m, cv::Size size, std::uint64_t seed) {
   Canvas canvas(size);
   Canvas turned(cv::Size(size.height, size.width));
+
+  // The grain runs upright.
   wood_board(turned, tone(m), seed);
   cv::rotate(turned, canvas, cv::ROTATE_90_CLOCKWISE);
   const int w = size.width, h = size.height;
+
+  // Two panels with bevelled edges.
   for (const auto& [y0, y1] : {std::pair{0.07, 0.45}, std::pair{0.53, 0.93}}) {
     const cv::Rect r(w / 6, static_cast<int>(y0 * h), 2 * w / 3, static_cast<int>((y1 - y0) * h));
     cv::rectangle(canvas, r, scalar(tone(m) * 0.45F), 5);
@@ -291,6 +319,8 @@ Canvas draw_tiles(const Material& m, cv::Size size, std::uint64_t seed) {
     canvas(r).setTo(scalar(tone(m) * rng.uniform(0.85, 1.1)));
   }
   modulate(canvas, fractal(size, 10, 10, 5, 0.75F, seed), 0.12F);
+
+  // Joints between the tiles.
   for (int i = 0; i < n; ++i) {
     cv::line(canvas, {i * step, 0}, {i * step, size.height}, cv::Scalar::all(0.3), 3);
     cv::line(canvas, {0, i * step}, {size.width, i * step}, cv::Scalar::all(0.3), 3);
@@ -300,6 +330,8 @@ Canvas draw_tiles(const Material& m, cv::Size size, std::uint64_t seed) {
 
 Canvas draw_cardboard(const Material& m, cv::Size size, std::uint64_t seed) {
   Canvas canvas(size, tone(m));
+
+  // Flutes, stains and grain.
   modulate(canvas, fractal(size, 3, 64, 3, 0.7F, seed), 0.05F);
   modulate(canvas, fractal(size, 4, 4, 4, 0.6F, seed + 4), 0.05F);
   modulate(canvas, grain(size, seed + 5), 0.05F);

@@ -24,6 +24,7 @@ Texture2d::Level encode(const Canvas& canvas) {
   for (const cv::Vec3f& c : canvas) {
     std::uint32_t texel = 0;
     for (int k = 0; k < 3; ++k) {
+      // Square root, for dark tones need finer steps.
       const float v = 255.0F * std::sqrt(std::clamp(c[k], 0.0F, 1.0F)) + 0.5F;
       texel |= static_cast<std::uint32_t>(v) << (8 * k);
     }
@@ -43,6 +44,8 @@ int power_of_two(double pixels) {
 Material worn(const Material& material, Texture texture) {
   if (texture != Texture::kNone) return material;
   const auto is = [&](std::string_view name) { return material.name == name; };
+
+  // Large surfaces lose their texture.
   if (material.large) {
     const bool floor = is("carpet") || is("planks") || is("tiles") || is("lino");
     return *find_material(floor ? "lino" : is("hall") ? "hall" : "cloth");
@@ -74,6 +77,8 @@ Texture2d draw_texture(const Material& material, Texture texture, std::uint64_t 
   }
 
   if (texture == Texture::kWeak) fade(canvas, 0.2F);
+
+  // Mip levels down to one texel.
   Texture2d out;
   while (true) {
     out.levels.push_back(encode(canvas));

@@ -32,6 +32,7 @@ double yaw_of(const geometry::Rigid3& world_from_body) {
   return std::atan2(ahead.y(), ahead.x());
 }
 
+/// Errors of one device at the start of a recording.
 ImuErrors draw_imu(const ImuModel& model, Rng& rng) {
   ImuErrors e;
   e.gyro_bias = normals(rng, model.gyro_bias);
@@ -63,10 +64,13 @@ std::vector<dataset::ImuReading> imu_readings(const SynthSource& source, const I
   const double first = source.info(0).stamp, last = source.info(source.size() - 1).stamp;
   for (double t = first; t <= last + step; t += step) {
     const PathMotion motion = source.motion(t, camera_from_body);
+
+    // Specific force: acceleration less gravity.
     const Vector3d force = motion.world_from_frame.rotation.transpose() * (motion.acceleration - gravity);
     const Vector3d gyro = gyro_axes * motion.turn_rate + gyro_bias + normals(rng, model.gyro_noise * root);
     const Vector3d accel = accel_axes * force + accel_bias + normals(rng, model.accel_noise * root);
 
+    // Biases drift, and readings are lost.
     gyro_bias += normals(rng, model.gyro_walk * std::sqrt(step));
     accel_bias += normals(rng, model.accel_walk * std::sqrt(step));
     if (rng.chance(model.gaps / 60.0 * step)) silent_until = t + 0.05;
@@ -91,6 +95,7 @@ std::vector<dataset::OdometryReading> odometry_readings(const SynthSource& sourc
     const geometry::Rigid3 from = source.motion(t, camera_from_body).world_from_frame,
                            to = source.motion(t + step, camera_from_body).world_from_frame;
 
+    // Motion in the body's frame, with slip and noise.
     const double heading = yaw_of(from), turned = std::remainder(yaw_of(to) - heading, 2.0 * M_PI);
     const Eigen::Rotation2Dd into_body(-(heading + 0.5 * turned));
     if (rng.chance(model.slip / 60.0 * step)) slips_until = t + 0.3;
@@ -98,6 +103,7 @@ std::vector<dataset::OdometryReading> odometry_readings(const SynthSource& sourc
     const Eigen::Vector2d moved = scale * wrong * (into_body * (to.translation - from.translation).head<2>());
     const double rotated = turn * wrong * turned;
 
+    // Dead reckoning of place and direction.
     const Eigen::Quaterniond q(Eigen::AngleAxisd(yaw, Vector3d::UnitZ()));
     readings.push_back(
         {t, {q, {place.x(), place.y(), 0.0}}, {moved.x() / step, moved.y() / step, 0.0}, rotated / step});

@@ -13,7 +13,8 @@
 
 namespace plumbline::synth {
 
-/// Any thread may ask. Frames that do not fit into kMostBytes are not kept: they are rendered again.
+/// Safe to call from any thread. Frames that do not fit into kMostBytes are not kept: they are rendered
+/// again.
 class KeptRound {
  public:
   static constexpr std::size_t kMostBytes = std::size_t{1} << 30U;
@@ -25,6 +26,8 @@ class KeptRound {
       const std::lock_guard<std::mutex> lock(mutex_);
       packed = frames_[index];
     }
+
+    // Unpacking needs no lock.
     if (packed[0].bytes.empty()) return std::nullopt;
     dataset::StoredPair pair;
     pair.color.pixels = packed[0].image();
@@ -33,6 +36,7 @@ class KeptRound {
   }
 
   void keep(std::size_t index, const dataset::StoredPair& pair) {
+    // Packing needs no lock.
     Packed packed{PackedImage(pair.color.pixels), PackedImage(pair.depth.pixels)};
     const std::size_t size = packed[0].bytes.size() + packed[1].bytes.size();
     const std::lock_guard<std::mutex> lock(mutex_);

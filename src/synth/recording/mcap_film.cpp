@@ -9,7 +9,7 @@ namespace plumbline::synth {
 
 namespace {
 
-/// Frames that are asked for one after another, rendered some at a time.
+/// Frames that are read in order, rendered in batches.
 class RenderedAhead final : public dataset::FrameSource {
  public:
   RenderedAhead(const SynthSource& source, const core::Executor& executor)
@@ -25,6 +25,7 @@ class RenderedAhead final : public dataset::FrameSource {
   [[nodiscard]] std::optional<geometry::Trajectory> truth() const override { return std::nullopt; }
   [[nodiscard]] core::Result<dataset::StoredPair> stored(std::size_t index) const override {
     if (index < first_ || index >= first_ + pairs_.size()) {
+      // A batch is rendered in parallel.
       first_ = index;
       pairs_.clear();
       pairs_.resize(std::min(static_cast<std::size_t>(executor_.threads()) * 4, size() - index));
@@ -42,21 +43,22 @@ class RenderedAhead final : public dataset::FrameSource {
 
 }  // namespace
 
-core::Result<std::size_t> write_mcap(const SynthSource& source, const std::filesystem::path& file,
-                                     const dataset::BodyReadings* body, const core::Executor& executor,
-                                     const core::StopToken& stop, const Progress& progress, core::Log& log) {
-  if (stop.stop_requested()) return std::size_t{0};
+core::Result<std::size_t> write_mcap(const RecordingJob& job, const std::filesystem::path& file,
+                                     const dataset::BodyReadings& body) {
+  if (job.run.stop.stop_requested()) return std::size_t{0};
   dataset::ConvertOptions options;
-  options.body = body;
+  options.body = &body;
   std::size_t done = 0;
-  options.stop = [&] { return done > 0 && stop.stop_requested(); };
+
+  // A stopped file holds at least one frame.
+  options.stop = [&] { return done > 0 && job.run.stop.stop_requested(); };
   options.progress = [&](std::size_t frames) {
     done = frames;
-    if (progress) progress(frames, source.size());
+    if (job.progress) job.progress(frames, job.source.size());
   };
 
-  const RenderedAhead ahead(source, executor);
-  const auto summary = dataset::convert_recording(ahead, file, options, log);
+  const RenderedAhead ahead(job.source, job.run.executor);
+  const auto summary = dataset::convert_recording(ahead, file, options, job.run.log);
   if (!summary) return tl::unexpected<core::Error>(summary.error());
   return summary->written;
 }

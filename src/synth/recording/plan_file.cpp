@@ -54,6 +54,7 @@ ordered_json line(const std::vector<Eigen::Vector2d>& points) {
   return out;
 }
 
+/// A room, with the faces of its walls.
 ordered_json describe_room(const Plan& plan, const PlanRoom& room) {
   ordered_json faces = ordered_json::array();
   for (const PlanFace& face : room.faces) {
@@ -68,6 +69,7 @@ ordered_json describe_room(const Plan& plan, const PlanRoom& room) {
           {"area_m2", room.area()}, {"height_m", room.height}, {"faces", faces}};
 }
 
+/// An opening, with its leaf if it is a door.
 ordered_json describe_opening(const Plan& plan, const PlanOpening& o) {
   const PlanWall& wall = plan.walls[static_cast<std::size_t>(o.wall)];
   ordered_json rooms = {o.front};
@@ -101,6 +103,7 @@ std::string describe_plan(const Plan& plan, const std::vector<geometry::Rigid3>&
   for (const PlanRoom& room : plan.rooms) rooms.push_back(describe_room(plan, room));
   for (const PlanOpening& o : plan.openings) openings.push_back(describe_opening(plan, o));
 
+  // Outlines of furniture.
   for (const PlanThing& thing : plan.things) {
     things.push_back({{"name", thing.name},
                       {"type", thing.type},
@@ -110,10 +113,12 @@ std::string describe_plan(const Plan& plan, const std::vector<geometry::Rigid3>&
                       {"top_m", thing.top}});
   }
 
+  // Start of each recording.
   for (std::size_t i = 0; i < starts.size(); ++i) {
     robots.push_back({{"folder", fmt::format("robot{}", i)}, {"world_from_first_camera", matrix(starts[i])}});
   }
 
+  // Shares seen, in the order of rooms and faces.
   if (coverage) {
     std::size_t next = 0;
     for (ordered_json& room : rooms) {
@@ -123,10 +128,12 @@ std::string describe_plan(const Plan& plan, const std::vector<geometry::Rigid3>&
     for (std::size_t i = 0; i < openings.size(); ++i) openings[i]["jambs_seen"] = coverage->jambs[i];
   }
 
+  // Keys in the order of the file.
   ordered_json file = {{"kind", plan.kind}, {"layout", plan.number}};
   file["storeys"] = plan.storeys;
   file["alike"] = plan.alike;
 
+  // Seen shares are known only with a reference.
   if (coverage) file["seen"] = coverage->all;
   file["rooms"] = rooms;
   file["openings"] = openings;
@@ -137,6 +144,7 @@ std::string describe_plan(const Plan& plan, const std::vector<geometry::Rigid3>&
 }
 
 std::string describe_changes(const Scene& scene) {
+  // Things have no box before they are added or after removal.
   const auto corners = [](const Eigen::AlignedBox3d& box) -> ordered_json {
     if (box.isEmpty()) return nullptr;
     return {{box.min().x(), box.min().y(), box.min().z()}, {box.max().x(), box.max().y(), box.max().z()}};
@@ -145,11 +153,14 @@ std::string describe_changes(const Scene& scene) {
 
   for (const SceneChange& c : scene.changes) {
     changes.push_back({{"kind", c.kind}});
+
+    // Light has no place.
     if (c.kind == "light") {
       changes.back()["factor"] = c.factor;
       continue;
     }
 
+    // Moved things, with what stands on them.
     changes.back().update({{"thing", c.thing},
                            {"with", c.with},
                            {"box_before_m", corners(c.before)},

@@ -31,7 +31,7 @@ std::string depth_name(const dataset::PairInfo& info) {
   return fmt::format("depth/{:.6f}.png", info.depth_stamp);
 }
 
-/// With the stamps that the files have.
+/// Stamps as the files have them.
 dataset::PairInfo labelled(const SynthSource& source, std::size_t index) {
   dataset::PairInfo info = source.true_info(index);
   info.depth_stamp -= source.true_camera().depth_delay_s;
@@ -83,6 +83,7 @@ Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs
   std::string color = "# timestamp filename\n", depth = color, pairs;
   geometry::Trajectory truth;
 
+  // Stamps and names of each pair.
   for (std::size_t i = 0; i < frames; ++i) {
     const dataset::PairInfo info = labelled(source, i);
     color += fmt::format("{:.6f} {}\n", info.stamp, color_name(info));
@@ -90,10 +91,13 @@ Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs
     pairs += fmt::format("{:.6f} {} {:.6f} {}\n", info.stamp, color_name(info), info.depth_stamp,
                          depth_name(info));
     truth.push_back({info.stamp, source.world_from_camera(info.stamp)});
+
+    // Truth at both stamps of a pair.
     const double depth_taken = source.true_info(i).depth_stamp;
     if (depth_taken != info.stamp) truth.push_back({depth_taken, source.world_from_camera(depth_taken)});
   }
 
+  // Depth may be older than colour.
   std::sort(truth.begin(), truth.end(),
             [](const geometry::StampedPose& a, const geometry::StampedPose& b) { return a.stamp < b.stamp; });
   if (pictures) {
@@ -106,30 +110,20 @@ Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs
   return dataset::write_trajectory(folder / "groundtruth.txt", truth);
 }
 
-/// State of one robot's recording.
-struct Job {
-  const SynthSource& source;
-  const SynthOptions& options;
-  fs::path folder;
-  std::uint64_t seed;
-  const core::Executor& executor;
-  const core::StopToken& stop;
-  Progress progress;  ///< frames of this recording, and all of them
-};
-
 /// Writes pictures; returns the number of frames, smaller than the total if stopped.
-Result<std::size_t> write_pictures(const Job& job) {
-  const std::size_t batch = static_cast<std::size_t>(job.executor.threads()) * 4;
+Result<std::size_t> write_pictures(const RecordingJob& job) {
+  const std::size_t batch = static_cast<std::size_t>(job.run.executor.threads()) * 4;
   std::size_t done = 0;
 
-  while (done < job.source.size() && !job.stop.stop_requested()) {
+  while (done < job.source.size() && !job.run.stop.stop_requested()) {
     // The first round is written before it is repeated.
     const std::size_t end = done < job.source.round() ? job.source.round() : job.source.size();
     const std::size_t count = std::min(batch, end - done);
     std::vector<std::string> problems(count);
-    job.executor.parallel_for(
+    job.run.executor.parallel_for(
         count, [&](std::size_t i) { problems[i] = write_pair(job.source, done + i, job.folder); });
 
+    // The first problem ends the recording.
     for (const std::string& problem : problems) {
       if (!problem.empty()) return core::output_error(problem);
     }
@@ -141,18 +135,22 @@ Result<std::size_t> write_pictures(const Job& job) {
 }
 
 /// Truth beside the first `frames` frames.
-Result<void> write_truth(const Job& job, std::size_t frames) {
+Result<void> write_truth(const RecordingJob& job, std::size_t frames) {
+  // Share of moving pixels, once per round.
   const std::size_t round = std::min(frames, job.source.round());
   std::vector<Result<double>> shares(round, 0.0);
-  job.executor.parallel_for(round, [&](std::size_t i) {
+  job.run.executor.parallel_for(round, [&](std::size_t i) {
     shares[i] = write_moving(job.source, i, job.folder, job.options.moving_masks);
   });
+
+  // One failed frame fails all.
   std::vector<double> moving;
   for (const auto& share : shares) {
     if (!share) return tl::unexpected<core::Error>(share.error());
     moving.push_back(*share);
   }
 
+  // Later rounds repeat the first one.
   const auto mask = [&](std::size_t i) {
     return job.folder / "moving" / color_name(labelled(job.source, i)).substr(4);
   };
@@ -162,6 +160,7 @@ Result<void> write_truth(const Job& job, std::size_t frames) {
     if (auto done = repeat_file(mask(i % round), mask(i)); !done) return done;
   }
 
+  // Lists, truth and, if there are any, events.
   auto ok = write_lists(job.source, frames, job.folder, !job.options.mcap);
   if (ok) ok = core::write_file(job.folder / "truth.csv", describe_truth(job.source, moving));
   if (ok && !(job.source.events().empty() && job.source.swings().empty()))
@@ -172,7 +171,7 @@ Result<void> write_truth(const Job& job, std::size_t frames) {
 }
 
 /// Returns the number of frames written; smaller than the total if stopped.
-Result<std::size_t> write_frames(const Job& job, core::Log& log) {
+Result<std::size_t> write_frames(const RecordingJob& job) {
   auto ok = core::make_folder(job.folder);
   for (const auto& [sub, wanted] :
        {std::pair("rgb", !job.options.mcap), std::pair("depth", !job.options.mcap),
@@ -181,6 +180,7 @@ Result<std::size_t> write_frames(const Job& job, core::Log& log) {
   }
   if (!ok) return tl::unexpected<core::Error>(ok.error());
 
+  // Sensors of the body.
   dataset::BodyReadings body;
   body.body_from_camera = job.source.body_from_camera();
   if (!job.options.imu.empty()) body.imu = imu_readings(job.source, *imu_model(job.options.imu), job.seed);
@@ -191,10 +191,11 @@ Result<std::size_t> write_frames(const Job& job, core::Log& log) {
     ok = core::write_file(job.folder / "odometry.csv", describe_odometry(body.odometry));
   if (!ok) return tl::unexpected<core::Error>(ok.error());
 
-  auto done = job.options.mcap ? write_mcap(job.source, job.folder / "recording.mcap", &body, job.executor,
-                                            job.stop, job.progress, log)
-                               : write_pictures(job);
+  // Pictures, in one file or in many.
+  auto done = job.options.mcap ? write_mcap(job, job.folder / "recording.mcap", body) : write_pictures(job);
   if (!done) return done;
+
+  // Truth of the frames written, even if stopped.
   if (ok = write_truth(job, *done); !ok) return tl::unexpected<core::Error>(ok.error());
   return done;
 }
@@ -202,6 +203,7 @@ Result<std::size_t> write_frames(const Job& job, core::Log& log) {
 std::string folder_name(int robot) { return fmt::format("robot{}", robot); }
 
 Result<void> check_free(const fs::path& output) {
+  // An earlier recording must not be overwritten.
   for (const fs::path& file : {output / "scene.json", output / folder_name(0)}) {
     if (fs::exists(file)) {
       return core::output_error(
@@ -211,6 +213,7 @@ Result<void> check_free(const fs::path& output) {
   return {};
 }
 
+/// One source per recording.
 Result<std::vector<std::unique_ptr<SynthSource>>> open_all(const std::shared_ptr<const World>& world) {
   std::vector<std::unique_ptr<SynthSource>> sources;
   for (int i = 0; i < recordings(world->options); ++i) {
@@ -222,31 +225,33 @@ Result<std::vector<std::unique_ptr<SynthSource>>> open_all(const std::shared_ptr
 }
 
 /// Writes the recording of each robot; returns their entries in scene.json.
-Result<nlohmann::json> write_robots(const std::vector<std::unique_ptr<SynthSource>>& sources,
-                                    const Scene& scene, const SynthOptions& options, const fs::path& output,
-                                    const core::Executor& executor, const core::StopToken& stop,
-                                    core::Log& log, const Progress& progress, WriteSummary& summary) {
+Result<nlohmann::json> write_robots(const WriteRequest& request,
+                                    const std::vector<std::unique_ptr<SynthSource>>& sources,
+                                    const RecordingRun& run, const Progress& progress,
+                                    WriteSummary& summary) {
+  const Scene& scene = request.scene;
+  const SynthOptions& options = request.options;
   summary.robots = static_cast<int>(sources.size());
   std::size_t all_frames = 0;
   for (const auto& source : sources) all_frames += source->size();
   const auto start = std::chrono::steady_clock::now();
   nlohmann::json robots = nlohmann::json::array();
 
-  for (std::size_t i = 0; i < sources.size() && !stop.stop_requested(); ++i) {
+  for (std::size_t i = 0; i < sources.size() && !run.stop.stop_requested(); ++i) {
     const std::string folder = folder_name(static_cast<int>(i));
     const std::size_t before = summary.frames;
 
-    const Job job{*sources[i],
-                  options,
-                  output / folder,
-                  mix(static_cast<std::uint64_t>(options.seed), options.rig.empty() ? i + 1 : 1),
-                  executor,
-                  stop,
-                  [&](std::size_t done, std::size_t) {
-                    if (progress) progress(before + done, all_frames);
-                  }};
+    // Progress counts the frames of all recordings.
+    const RecordingJob job{*sources[i],
+                           options,
+                           request.output / folder,
+                           mix(static_cast<std::uint64_t>(options.seed), options.rig.empty() ? i + 1 : 1),
+                           run,
+                           [&](std::size_t done, std::size_t) {
+                             if (progress) progress(before + done, all_frames);
+                           }};
 
-    const auto written = write_frames(job, log);
+    const auto written = write_frames(job);
     if (!written) return tl::unexpected<core::Error>(written.error());
     summary.frames += *written;
     summary.path_m += sources[i]->path_length();
@@ -281,6 +286,7 @@ PlanCoverage cover(const Scene& scene, const Visibility& visibility, const Refer
     sum.seen += area * visibility.seen_share(i);
   }
 
+  // Shares by area, in the order of the objects.
   for (std::size_t i = 0; i < sums.size(); ++i) {
     const double share = sums[i].area > 0.0 ? sums[i].seen / sums[i].area : 0.0;
     if (scene.objects[i].type == "wall") coverage.wall_faces.push_back(share);
@@ -301,10 +307,12 @@ Result<void> write_plan(const Scene& scene, const std::vector<std::unique_ptr<Sy
 
 }  // namespace
 
-Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& options, const fs::path& output,
-                                      const core::Executor& executor, const core::StopToken& stop,
-                                      core::Log& log, const Progress& progress) {
+Result<WriteSummary> write_recordings(const WriteRequest& request, const core::Executor& executor,
+                                      const core::StopToken& stop, core::Log& log, const Progress& progress) {
+  const auto& [scene, options, output] = request;
   const auto fail = [](const core::Error& e) { return tl::unexpected<core::Error>(e); };
+
+  // Refused before any work is done.
   if (auto ok = check_free(output); !ok) return fail(ok.error());
   auto world = build_world(scene, options, executor);
   if (!world) return fail(world.error());
@@ -313,12 +321,14 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
   if (auto ok = check_free(output); !ok) return fail(ok.error());  // building the world took its time
   if (auto ok = core::make_folder(output); !ok) return fail(ok.error());
 
+  // All recordings, then the surfaces that they saw.
   WriteSummary summary;
-  const auto robots = write_robots(*sources, scene, options, output, executor, stop, log, progress, summary);
+  const auto robots = write_robots(request, *sources, {executor, stop, log}, progress, summary);
   if (!robots) return fail(robots.error());
   summary.reference_spacing_m =
       options.reference_spacing > 0.0 ? options.reference_spacing : default_spacing(scene);
 
+  // A stopped run has no reference.
   std::optional<PlanCoverage> coverage;
   if (!stop.stop_requested()) {
     Visibility visibility(*world, summary.reference_spacing_m);
@@ -337,15 +347,18 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
   }
   if (auto ok = write_plan(scene, *sources, coverage, output); !ok) return fail(ok.error());
 
+  // True changes, to judge those found.
   if (!options.changes.empty()) {
     if (auto ok = core::write_file(output / "changes.json", describe_changes(scene)); !ok)
       return fail(ok.error());
   }
 
+  // Written last, with the state of the run.
   summary.stopped = stop.stop_requested();
   const std::string json = core::json_text(describe_world(scene, options, summary, *robots));
   if (auto ok = core::write_file(output / "scene.json", json); !ok) return fail(ok.error());
 
+  // A summary for the user.
   log.info(fmt::format("{}: {} frames of {} robot(s) in {:.1f} s, {} reference samples ({} visible)",
                        scene.name, summary.frames, summary.robots, summary.wall_s, summary.reference_samples,
                        summary.reference_visible));

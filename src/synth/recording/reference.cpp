@@ -41,6 +41,7 @@ struct PlySample {
 };
 static_assert(sizeof(PlySample) == 28);
 
+/// A sample with the colour and normal of its face.
 PlySample make_sample(const World& world, std::size_t index, double u, double v, const Vector3d& p,
                       bool visible) {
   const cv::Vec3b c = surface_color(world, index, u, v);
@@ -58,7 +59,6 @@ std::vector<PlySample> sample_face(const World& world, const Visibility& visibil
 
   // The middle of the grid's cells, whole cells over the face, so that no edge is favoured.
   const int nu = std::max(1, static_cast<int>(std::lround((b.max().x() - b.min().x()) / spacing)));
-
   const int nv = std::max(1, static_cast<int>(std::lround((b.max().y() - b.min().y()) / spacing)));
   const double du = (b.max().x() - b.min().x()) / nu, dv = (b.max().y() - b.min().y()) / nv;
   std::vector<signed char> outside(static_cast<std::size_t>((nu / 16 + 1) * (nv / 16 + 1)), -1);
@@ -67,6 +67,7 @@ std::vector<PlySample> sample_face(const World& world, const Visibility& visibil
       const Vector2d uv(b.min().x() + (i + 0.5) * du, b.min().y() + (j + 0.5) * dv);
       if (!face.contains(uv, 1e-9)) continue;
 
+      // Surface inside solids or outside the world is left out.
       const Vector3d p = face.at(uv.x(), uv.y()), before = p + 0.002 * face.normal;
       const bool visible = visibility.seen(index, uv.x(), uv.y());
       if (!visible) {
@@ -88,6 +89,7 @@ Visibility::Visibility(std::shared_ptr<const World> world, double spacing)
     : world_(std::move(world)), block_(std::max(0.02, spacing)) {
   std::size_t count = 0;
   for (const Face& face : world_->scene.faces) {
+    // A grid of flags over the bounds of each face.
     const Eigen::AlignedBox2d b = face.bounds();
     const Grid grid{b.min().x(), b.min().y(), 1 + static_cast<int>((b.max().x() - b.min().x()) / block_),
                     1 + static_cast<int>((b.max().y() - b.min().y()) / block_), count};
@@ -112,7 +114,7 @@ double Visibility::seen_share(std::size_t face) const {
   return static_cast<double>(seen) / static_cast<double>(count);
 }
 
-/// By face.
+/// For each face, 1 if a pixel shows it.
 static std::vector<char> faces_in(const View& view, std::size_t count) {
   std::vector<char> present(count, 0);
   for (const int id : view.ids) {
@@ -126,12 +128,15 @@ void Visibility::mark(const geometry::Rigid3& world_from_camera, const sensor::P
   const DepthRange range = depth_range(world_->options.sensor);
   const geometry::Rigid3 camera_from_world = world_from_camera.inverse();
   const std::vector<char> present = faces_in(view, world_->scene.faces.size());
+
+  // In range, in the image, measurable and not hidden.
   const auto sees = [&](std::size_t index, const Vector3d& p) {
     const Vector3d c = camera_from_world * p;
     if (c.z() < range.min || c.z() > std::min(range.max, world_->options.visible_range)) return false;
     const Vector2d pixel = camera.project(c);
     if (!camera.contains(pixel, 1.0)) return false;
 
+    // The sensor must get enough light back.
     const Vector3d ray = (p - world_from_camera.translation).normalized();
     if (!measures(world_->options.sensor, *world_->materials[index], {camera.width, camera.height},
                   {pixel.x(), pixel.y()}, c.z(), std::abs(ray.dot(world_->scene.faces[index].normal)))) {
@@ -142,17 +147,18 @@ void Visibility::mark(const geometry::Rigid3& world_from_camera, const sensor::P
            static_cast<int>(index);
   };
 
+  // Each block by its middle and corners.
   for (std::size_t index = 0; index < present.size(); ++index) {
     if (present[index] == 0) continue;
     const Face& face = world_->scene.faces[index];
     const Grid& g = grids_[index];
-
     const Eigen::AlignedBox2d b = face.bounds();
     for (int j = 0; j < g.rows; ++j) {
       for (int i = 0; i < g.columns; ++i) {
         std::atomic<std::uint8_t>& flag = flags_[g.at(i, j)];
         if (flag.load(std::memory_order_relaxed) != 0) continue;
 
+        // The block's middle decides first.
         const double ua = g.u0 + i * block_, va = g.v0 + j * block_;
         const double ub = std::min(ua + block_, b.max().x()), vb = std::min(va + block_, b.max().y());
         const Vector3d middle = face.at(0.5 * (ua + ub), 0.5 * (va + vb));
@@ -161,6 +167,7 @@ void Visibility::mark(const geometry::Rigid3& world_from_camera, const sensor::P
         const Vector3d ray = (middle - world_from_camera.translation).normalized();
         if (std::abs(ray.dot(face.normal)) < kLeastSine) continue;
 
+        // Only blocks seen in full count.
         const double e = 1e-3;
         if (sees(index, face.at(ua + e, va + e)) && sees(index, face.at(ub - e, va + e)) &&
             sees(index, face.at(ua + e, vb - e)) && sees(index, face.at(ub - e, vb - e))) {
@@ -172,6 +179,7 @@ void Visibility::mark(const geometry::Rigid3& world_from_camera, const sensor::P
 }
 
 void Visibility::add(const SynthSource& source, const core::Executor& executor, const core::StopToken& stop) {
+  // About 200 frames of one round suffice.
   const std::size_t step = std::max<std::size_t>(3, source.round() / 200);
   const std::size_t looks = (source.round() + step - 1) / step;
   executor.parallel_for(looks, [&](std::size_t k) {
@@ -191,6 +199,7 @@ double default_spacing(const Scene& scene) {
 core::Result<ReferenceCounts> write_reference(const std::filesystem::path& file, const World& world,
                                               const Visibility& visibility, double spacing,
                                               const core::Executor& executor) {
+  // Faces in parallel, samples in their order.
   std::vector<std::vector<PlySample>> parts(world.fixed_faces);
   executor.parallel_for(parts.size(), [&](std::size_t i) {
     if (world.gone[i] == 0) parts[i] = sample_face(world, visibility, i, spacing);
@@ -202,6 +211,7 @@ core::Result<ReferenceCounts> write_reference(const std::filesystem::path& file,
     for (const PlySample& s : part) counts.visible += s.visible;
   }
 
+  // The header counts all samples.
   std::ofstream out(file, std::ios::binary);
   out << fmt::format(
       "ply\nformat binary_little_endian 1.0\ncomment samples of the true surfaces, {:.4f} m apart; visible = "
@@ -213,11 +223,13 @@ core::Result<ReferenceCounts> write_reference(const std::filesystem::path& file,
   for (const char* name : {"red", "green", "blue", "visible"}) out << "property uchar " << name << "\n";
   out << "end_header\n";
 
+  // Samples are stored as in memory.
   for (const auto& part : parts) {
     out.write(reinterpret_cast<const char*>(part.data()),
               static_cast<std::streamsize>(part.size() * sizeof(PlySample)));
   }
 
+  // Errors of the disk appear at the latest now.
   out.flush();
   if (!out)
     return core::output_error(

@@ -68,6 +68,7 @@ nlohmann::json describe_options(const Scene& scene, const SynthOptions& options)
   given.declare(table);
   usual.declare(defaults);
 
+  // Options that differ from their defaults.
   for (const core::OptionSpec& spec : table.specs()) {
     if (spec.key == "reference_spacing" || json.contains(spec.key) ||
         table.value(spec.key) == defaults.value(spec.key))
@@ -97,12 +98,15 @@ nlohmann::json describe_robot(const SynthSource& source, const std::string& fold
       {"last_stamp", last.stamp},
       {"start", {{"position_m", {t.x(), t.y(), t.z()}}, {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}}}};
 
+  // Errors that estimates are compared with.
   if (!options.camera_error.empty()) {
     json["camera"] = {{"file", describe_camera(source.camera())},
                       {"true", describe_camera(source.true_camera())}};
   }
 
   if (!options.imu.empty()) json["imu"] = describe_imu_errors(*imu_model(options.imu), seed);
+
+  // Place of the camera on the rig.
   if (!options.rig.empty()) {
     const Eigen::Quaterniond turn = source.body_from_camera().quaternion();
     const Eigen::Vector3d& place = source.body_from_camera().translation;

@@ -23,6 +23,7 @@ sensor::Camera make_camera(Sensor sensor, int width, int height, double fps) {
   // Colour cameras 69 degrees across.
   const bool wide = sensor == Sensor::kRealsense || sensor == Sensor::kStereo || sensor == Sensor::kPhone;
 
+  // Intrinsics of the devices, scaled to the image.
   camera.color = {width,
                   height,
                   (wide ? 462.0 : 535.4) * s,
@@ -30,6 +31,7 @@ sensor::Camera make_camera(Sensor sensor, int width, int height, double fps) {
                   0.5 * width + 0.1 * s,
                   0.5 * height + 7.6 * s};
 
+  // Other devices differ in focal length and centre.
   if (sensor == Sensor::kIdeal) camera.color.fx = camera.color.fy = 525.0 * s;
   if (sensor == Sensor::kIdeal) camera.color.cx = 0.5 * (width - 1);
   if (sensor != Sensor::kKinect && sensor != Sensor::kStructured) camera.color.cy = 0.5 * (height - 1);
@@ -54,6 +56,8 @@ std::vector<Stamps> make_stamps(const SynthOptions& o, const std::vector<Event>&
     const double t = static_cast<double>(i) / o.fps;
     const double jitter = ideal ? 0.0 : rng.uniform(-0.0012, 0.0012),
                  other = ideal ? 0.0 : rng.uniform(-0.0006, 0.0006);
+
+    // Dropped frames leave a gap in the numbers.
     bool dropped = false;
     for (const Event& e : events) dropped = dropped || (e.kind == EventKind::kDrop && e.active(t));
     const double stamp = whole_us(kFirstStamp + t + jitter);
@@ -93,6 +97,7 @@ core::Result<void> SynthSource::Impl::check_way() const {
         world->scene
             .objects[static_cast<std::size_t>(world->scene.faces[static_cast<std::size_t>(hit.face)].object)];
 
+    // The message names waypoints and the object.
     const core::ConfigMark& mark = robot_path.waypoints[k].mark;
     return core::usage_error(
         fmt::format("{}:{}: the path of {} {} {} (line {}) between waypoints {} and {}, at ({:.2f}, {:.2f}, "
@@ -112,11 +117,14 @@ core::Result<void> SynthSource::Impl::check_way() const {
   Vector3d here = first;
   const double once = std::min(end, 2.0 * path->duration() + 60.0);  // later rounds repeat the first
 
+  // Small steps follow the curve of the path.
   constexpr double kStep = 0.02;  // s
   const auto steps = static_cast<int>(once / kStep);
   for (int i = 1; i <= steps; ++i) {
     const double t = i * kStep;
     const Vector3d to = at(t).translation;
+
+    // Nothing may be between two successive places.
     const Vector3d step = to - here;
     const double length = step.norm();
     if (length > 1e-7) {
@@ -141,6 +149,7 @@ void SynthSource::Impl::repeat() {
   round = frames.size();
   kept = std::make_shared<KeptRound>(round);
 
+  // Later rounds have later stamps and events.
   for (std::size_t first = once; first < wanted; first += once) {
     const double later = static_cast<double>(first) / o.fps;
     for (std::size_t i = 0; i < round; ++i) {
@@ -148,6 +157,8 @@ void SynthSource::Impl::repeat() {
       if (first + static_cast<std::size_t>(at.number) >= wanted) break;
       frames.push_back({at.number, whole_us(at.color + later), whole_us(at.depth + later)});
     }
+
+    // Events repeat in each round.
     for (Event event : world->events) {
       event.start_s += later;
       events.push_back(event);
@@ -168,6 +179,7 @@ core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(const std::sh
         fmt::format("robot {} of {}: robots count from 0 to {}", robot, recordings(o), recordings(o) - 1));
   }
 
+  // The cameras of a rig share one path.
   const auto paths = world->scene.robots.size();
   const int driver = o.rig.empty() ? robot : 0;
   const RobotPath& way = world->scene.robots[static_cast<std::size_t>(driver) % paths];
@@ -184,6 +196,7 @@ core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(const std::sh
     impl->camera.color_from_depth = Rigid3();
   }
 
+  // The camera that the recording reports.
   auto told = told_camera(o, robot, impl->camera);
   if (!told) return tl::unexpected<core::Error>(told.error());
   impl->told = std::move(*told);
@@ -223,6 +236,8 @@ core::Result<std::unique_ptr<SynthSource>> SynthSource::create(const std::shared
   auto planned = plan(world, robot);
   if (!planned) return tl::unexpected<core::Error>(planned.error());
   std::unique_ptr<Impl> impl = std::move(*planned);
+
+  // Only rendering needs marks and noise.
   impl->marks =
       LensMarks(impl->color_faults, {impl->camera.color.width, impl->camera.color.height}, impl->seed);
   impl->tiles = make_noise(impl->world->options.sensor, impl->seed);
@@ -277,10 +292,13 @@ core::Result<dataset::StoredPair> SynthSource::stored(std::size_t index) const {
     return core::input_error(fmt::format("{}: frame {} of {}", impl_->name, index, impl_->frames.size()));
   }
 
+  // Later rounds repeat the frames of the first.
   const std::size_t first = index % impl_->round;
   if (impl_->kept == nullptr) return rendered(index);
   if (auto pair = impl_->kept->find(first)) return std::move(*pair);
   dataset::StoredPair pair = rendered(index);
+
+  // Kept only if another round follows.
   if (first + impl_->round < size()) impl_->kept->keep(first, pair);
   return pair;
 }
@@ -295,6 +313,7 @@ core::Result<sensor::RgbdFrame> SynthSource::read(std::size_t index) const {
   frame.stamp = at.stamp;
   frame.depth_stamp = at.depth_stamp;
 
+  // Rectified to the reported camera.
   frame.color = rectifier ? rectifier->color(pair->color.pixels) : pair->color.pixels;
   cv::cvtColor(frame.color, frame.gray, cv::COLOR_BGR2GRAY);
   if (rectifier) {

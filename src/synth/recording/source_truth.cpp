@@ -25,6 +25,8 @@ PathMotion SynthSource::motion(double stamp, const Rigid3& camera_from_frame) co
   constexpr double kStep = 1e-3;
   const auto at = [&](double t) { return impl_->pose(t) * camera_from_frame; };
   const Rigid3 before = at(stamp - kStep), now = at(stamp), after = at(stamp + kStep);
+
+  // Central differences over two steps.
   return {now, (after.translation - before.translation) / (2.0 * kStep),
           (after.translation - 2.0 * now.translation + before.translation) / (kStep * kStep),
           geometry::log_so3(before.rotation.transpose() * after.rotation) / (2.0 * kStep)};
@@ -60,10 +62,13 @@ std::vector<DoorSwing> SynthSource::swings() const {
   for (const MovingDoor& door : impl_->world->scene.moving_doors) {
     add_moves(door, out);
 
+    // Each round repeats them, there and back.
     for (int round = 0; round * once < end; ++round) {
       for (const double start : door.starts) {
         for (const bool back : {false, true}) {
           const double at = round * once + start + (back ? door.swing + door.hold : 0.0);
+
+          // Drawers move in metres, doors in radians.
           const double unit = door.drawer.empty() ? 1.0 : door.slide.norm();
           if (start < once && at < end)
             out.push_back({door.opening, door.drawer, kFirstStamp + at, kFirstStamp + at + door.swing,

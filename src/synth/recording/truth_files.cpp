@@ -15,12 +15,14 @@ std::string describe_truth(const SynthSource& source, const std::vector<double>&
     bool covered = false;
     std::string active;
 
+    // Events at that time.
     for (const Event& event : source.events()) {
       if (!event.active(stamp - source.start())) continue;
       covered = covered || event.kind == EventKind::kCover;
       active += (active.empty() ? "" : " ") + std::string(to_string(event.kind));
     }
 
+    // Pose, velocity, turn rate.
     text += fmt::format("{:.6f}", stamp);
     for (const double v : {pose.translation.x(), pose.translation.y(), pose.translation.z()})
       text += fmt::format(",{:.6f}", v);
@@ -38,6 +40,8 @@ std::string describe_events(const SynthSource& source) {
     text += fmt::format("{},{:.6f},{:.6f},{}\n", to_string(e.kind), source.start() + e.start_s,
                         source.start() + e.start_s + e.duration_s, e.value);
   }
+
+  // Doors in degrees, drawers in metres.
   for (const DoorSwing& s : source.swings()) {
     const bool door = s.drawer.empty();
     text += fmt::format("{},{:.6f},{:.6f},{:.3f}\n", door ? fmt::format("door {}", s.opening) : s.drawer,

@@ -27,10 +27,12 @@ core::Result<Parsed> parse_url(const std::string& url) {
   if (parsed.scene.empty())
     return core::usage_error(fmt::format("'{}' names no scene (synth:SCENE?key=value&...)", url));
 
+  // Read as a configuration, with its error messages.
   core::ConfigNode map;
   map.kind = core::ConfigNode::Kind::kMap;
   map.mark.file = url;
 
+  // Pairs of key and value.
   std::string rest = question == std::string::npos ? "" : body.substr(question + 1);
   while (!rest.empty()) {
     const auto amp = rest.find('&');
@@ -48,6 +50,7 @@ core::Result<Parsed> parse_url(const std::string& url) {
     map.key_marks.push_back(map.mark);
   }
 
+  // Options of the generator, and the robot.
   core::OptionTable table;
   parsed.options.declare(table);
   table.integer("robot", parsed.robot, {0, 63}, "", "Which of the robots, from 0");
@@ -55,6 +58,8 @@ core::Result<Parsed> parse_url(const std::string& url) {
   core::ConfigProblems problems;
   table.set_all(map, "", problems);
   if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));
+
+  // The robot's number implies at least as many.
   if (parsed.options.rig.empty() && parsed.robot >= parsed.options.robots)
     parsed.options.robots = parsed.robot + 1;
   return parsed;
@@ -74,6 +79,8 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_synth(const std::string
   if (!scene) return tl::unexpected<core::Error>(scene.error());
   auto world = build_world(*scene, parsed->options, executor);
   if (!world) return tl::unexpected<core::Error>(world.error());
+
+  // Each robot is a recording.
   if (parsed->robot < 0 && parsed->options.robots > 1)
     log.warning(fmt::format("{}: robot 0 of {}; add &robot=1 for another", url, parsed->options.robots));
   auto source = SynthSource::create(*world, std::max(0, parsed->robot));

@@ -76,10 +76,13 @@ FaultyDepth lit_depth(const World& world, const View& view, const DepthFaults& f
       float& z = depth(y, x);
       if (face < 0 || !(z > 0.0F)) continue;
 
+      // The surface, and the angle at which it is seen.
       const Material& m = *world.materials[static_cast<std::size_t>(face)];
       const float cosine = incidence(view, face, x, y);
       const bool fixed = static_cast<std::size_t>(face) < world.fixed_faces;
       const float reflectance = m.gloss + (1.0F - m.gloss) * std::pow(1.0F - cosine, 5.0F);  // Schlick
+
+      // Mirrors show the depth of mirror images.
       if (faults.mirrors > 0.0 && fixed && m.gloss >= 0.1F &&
           static_cast<double>(reflectance) > faults.mirrors) {
         z = bounces.mirrored(face, x, y, z);
@@ -87,12 +90,14 @@ FaultyDepth lit_depth(const World& world, const View& view, const DepthFaults& f
         continue;
       }
 
+      // Grazing, dark and glossy surfaces return nothing.
       const bool glint = m.gloss > 0.25F && cosine > 0.995F;
       if (faults.holes > 0.0 && (static_cast<double>(cosine) < faults.holes || m.infrared < 0.1F || glint)) {
         z = 0.0F;
         continue;
       }
 
+      // Light from surrounding surfaces lengthens the path.
       if (faults.multipath > 0.0 && fixed) {
         const auto cell = static_cast<std::size_t>(x / kCell);
         if (last_face[cell] != face) enclosed[cell] = bounces.enclosure(face, x, y, z);
@@ -139,6 +144,7 @@ FaultyDepth faulty_depth(const World& world, const View& view, const DepthFaults
       float& z = depth(y, x);
       if (!(z > 0.0F)) continue;
 
+      // All factors multiply, the offset adds to inverse depth.
       const double radius2 = ((x - cx) * (x - cx) + (y - cy) * (y - cy)) / (cx * cx + cy * cy);
       const double length = view.camera.unproject(x, y, 1.0).norm();
       const double inverse = 1.0 / static_cast<double>(z) + faults.offset;

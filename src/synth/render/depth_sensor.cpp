@@ -52,7 +52,7 @@ void correlate(cv::Mat1f& tile, double sigma) {
   tile = (tile - mean[0]) / deviation[0];
 }
 
-/// A tile with a shift of its own.
+/// A tile with an independent shift.
 class Field {
  public:
   Field(const cv::Mat1f& tile, std::uint64_t key)
@@ -70,7 +70,7 @@ std::uint64_t frame_bits(const FrameKey& key, std::uint64_t purpose, std::int64_
   return mix(key.seed, purpose, static_cast<std::uint64_t>(frame));
 }
 
-/// Exact depth looked up where the matching window of the device really sat: borders become ragged.
+/// Exact depth looked up where the matching window of the device really was: borders become ragged.
 cv::Mat1f wander(const cv::Mat1f& exact, const Device& d, const NoiseTiles& tiles, const FrameKey& key,
                  cv::Mat1b& from) {
   const Field still_x(tiles.coarse, mix(key.seed, 11)), still_y(tiles.coarse, mix(key.seed, 12));
@@ -89,11 +89,13 @@ cv::Mat1f wander(const cv::Mat1f& exact, const Device& d, const NoiseTiles& tile
           std::abs(left + right - 2.0F * z) > tolerance || std::abs(up[x] + low[x] - 2.0F * z) > tolerance;
       from(y, x) = border ? 1 : 0;
 
+      // Smooth surfaces do not depend on the window.
       if (!border) {
         out(y, x) = z;
         continue;
       }
 
+      // A constant part of the offset and a changing one.
       const float jx = d.wander * (0.6F * still_x.at(x, y) + 0.8F * now_x.at(x, y));
       const float jy = d.wander * (0.6F * still_y.at(x, y) + 0.8F * now_y.at(x, y));
       const int sx = std::clamp(x + static_cast<int>(std::lround(jx)), 0, exact.cols - 1);
@@ -161,6 +163,7 @@ class Measurement {
     cast_shadow(depth, device_.focal_baseline);
     cv::Mat1w raw(depth.size());
     for (int y = 0; y < raw.rows; ++y) {
+      // By formulas, or by simulated matching.
       if (modelled(sensor_)) {
         model_row(y, depth, border, raw[y]);
       } else {
@@ -194,6 +197,7 @@ class Measurement {
     const double fixed = std::sqrt(share), fresh = std::sqrt(1.0 - share);
     std::fill(out, out + depth.cols, std::uint16_t{0});
 
+    // Columns that the device covers.
     const auto [first, end] = seen_columns(device_, depth.cols, depth.rows, y);
     for (int x = first; x < end; ++x) {
       const int face = view_.ids(y, x);
@@ -202,12 +206,14 @@ class Measurement {
       const auto z = static_cast<double>(border(y, x) != 0 ? border_depth(depth, x, y, chance) : depth(y, x));
       if (z < range_.min || z > range_.max) continue;
 
+      // Too little light returns.
       const auto cosine = std::min(1.0, static_cast<double>(incidence(view_, face, x, y)));
       const auto reflectance =
           static_cast<double>(world_.materials[static_cast<std::size_t>(face)]->infrared);
       const double least = 1.0 + kSignalFlicker * static_cast<double>(chance);
       if (!mirrors(x, y) && model_signal(sensor_, reflectance, cosine, z) < least) continue;
 
+      // Fixed pattern and temporal noise.
       const double sigma = model_sigma(sensor_, z, std::acos(cosine), view_.camera.fx);
       const double noise =
           fixed * static_cast<double>(still.at(x, y)) + fresh * static_cast<double>(now.at(x, y));
@@ -240,6 +246,7 @@ class Measurement {
       float z = depth(y, x);
       if (!(z > 0.0F) || ids[x] < 0) continue;
 
+      // Borders take the depth of one side, or none.
       const float chance = flicker.at(x, y);
       if (border(y, x) != 0) z = border_depth(depth, x, y, chance);
       if (!(z > 0.0F)) continue;
@@ -248,9 +255,11 @@ class Measurement {
       lit = ids[x];
       if (!mirrors(x, y) && weak < kLeastLight + 0.018F * blobs.at(x, y) + 0.012F * chance) continue;
 
+      // The limit of range is not sharp.
       const auto zd = static_cast<double>(z);
       if (zd < range_.min || zd > range_.max + 0.15 * static_cast<double>(blobs.at(x, y))) continue;
 
+      // Noise and steps are those of disparity.
       const float per_metre = device_.focal_baseline / (z * z);
       const float sigma = static_cast<float>(sensor::depth_sigma(zd)) * per_metre;
       const float own = std::sqrt(std::max(0.15F * sigma * sigma, sigma * sigma - step2));
@@ -291,6 +300,8 @@ bool measures(Sensor sensor, const Material& material, const cv::Size& size, con
               double z, double cosine) {
   if (sensor == Sensor::kIdeal) return true;
   constexpr float kFlicker = 0.05F;  // about two standard deviations of the least light
+
+  // Columns that the device does not cover.
   const Seen seen = seen_columns(device(sensor), size.width, size.height, static_cast<int>(pixel.y));
   if (pixel.x < seen.first || pixel.x >= seen.end) return false;
   if (modelled(sensor))
@@ -303,6 +314,7 @@ NoiseTiles make_noise(Sensor sensor, std::uint64_t seed) {
   NoiseTiles tiles;
   if (sensor == Sensor::kIdeal) return tiles;
 
+  // Correlation lengths of the devices.
   tiles.fine = white_tile(mix(seed, 1));
   correlate(tiles.fine, sensor == Sensor::kRealsense || sensor == Sensor::kStereo ? 1.8 : 1.1);
   tiles.medium = white_tile(mix(seed, 7));
@@ -336,6 +348,8 @@ NoiseTiles make_noise(Sensor sensor, std::uint64_t seed) {
 cv::Mat1w measure_depth(const World& world, const View& view, Sensor sensor, const DepthFaults& faults,
                         const NoiseTiles& tiles, const FrameKey& key) {
   if (sensor != Sensor::kIdeal) return Measurement(world, view, sensor, faults, tiles, key).run();
+
+  // An ideal sensor only clips and rounds.
   const cv::Mat1f exact = faulty_depth(world, view, faults, frame_bits(key, 41, key.index)).depth;
   cv::Mat1w raw(exact.size());
   const auto range = depth_range(sensor);
@@ -388,6 +402,7 @@ void smear(const cv::Mat3b& image, const cv::Rect& cell, const cv::Vec2f& f, int
     dy[k] = static_cast<int>(std::lround(s * f[1]));
   }
 
+  // Rounded division in integers.
   const int divide = (65536 + taps / 2) / taps;
 
   for (int y = cell.y; y < cell.y + cell.height; ++y) {
@@ -395,6 +410,8 @@ void smear(const cv::Mat3b& image, const cv::Rect& cell, const cv::Vec2f& f, int
 
     for (int k = 0; k < taps; ++k) {
       const auto* row = image.ptr<std::uint8_t>(std::clamp(y + dy[k], 0, image.rows - 1));
+
+      // Far from the border no pixel needs clamping.
       if (cell.x + dx[k] >= 0 && cell.x + dx[k] + cell.width <= image.cols) {
         const std::uint8_t* p = row + 3 * (cell.x + dx[k]);
         for (int i = 0; i < 3 * cell.width; ++i) sum[i] += p[i];
@@ -406,6 +423,7 @@ void smear(const cv::Mat3b& image, const cv::Rect& cell, const cv::Vec2f& f, int
       }
     }
 
+    // Back to bytes, rounded.
     auto* q = out.ptr<std::uint8_t>(y) + 3 * cell.x;
     for (int i = 0; i < 3 * cell.width; ++i)
       q[i] = static_cast<std::uint8_t>(std::min(255, (sum[i] * divide + 32768) >> 16));
@@ -416,6 +434,8 @@ void smear(const cv::Mat3b& image, const cv::Rect& cell, const cv::Vec2f& f, int
 cv::Mat3b motion_blur(const cv::Mat3b& image, const cv::Mat2f& flow) {
   double longest = 0.0;
   for (const cv::Vec2f& f : flow) longest = std::max(longest, static_cast<double>(std::hypot(f[0], f[1])));
+
+  // Less than a pixel is not visible.
   if (longest < 0.8) return image;
   constexpr int kCell = 8;  // pixels that share a direction
   const int taps = std::clamp(static_cast<int>(std::ceil(longest)) + 1, 3, 16);

@@ -56,6 +56,7 @@ void fill_hidden(LightMap& map, std::vector<char>& hidden) {
         const auto at = static_cast<std::size_t>(j * map.columns + i);
         if (hidden[at] == 0) continue;
 
+        // Mean of the known neighbours, at most eight.
         float sum = 0.0F;
         int count = 0;
         for (int y = std::max(0, j - 1); y <= std::min(map.rows - 1, j + 1); ++y) {
@@ -71,6 +72,7 @@ void fill_hidden(LightMap& map, std::vector<char>& hidden) {
       }
     }
 
+    // Applied together, so that order does not matter.
     for (const auto& [at, value] : found) {
       map.nodes[at] = value;
       hidden[at] = 0;
@@ -100,6 +102,8 @@ double lamps_at(const World& world, const Vector3d& p, const Face& face) {
         const Vector3d d = q - p;
         const double r2 = d.squaredNorm(), r = std::sqrt(r2);
         const double cosines = face.normal.dot(d) * -lamp.normal.dot(d) / r2;
+
+        // Behind the surface or the lamp, or too near.
         if (face.normal.dot(d) <= 0.0 || lamp.normal.dot(d) >= 0.0 || r < 0.02) continue;
         if (world.free_distance(p, d / r, r - 0.02) < r - 0.021) continue;
         part += cosines / std::max(r2, 0.05);
@@ -119,6 +123,7 @@ LightMap light_face(const World& world, std::size_t index) {
   const double u1 = bounds.max().x(), v1 = bounds.max().y();
   const double w = std::max(u1 - u0, 1e-4), h = std::max(v1 - v0, 1e-4);
 
+  // At most 80 nodes along a side.
   const double pitch = std::max(world.scene.light_pitch, std::max(w, h) / 80.0);
 
   LightMap map;
@@ -126,13 +131,13 @@ LightMap light_face(const World& world, std::size_t index) {
   map.rows = 2 + static_cast<int>(h / pitch);
   map.u0 = static_cast<float>(u0);
   map.v0 = static_cast<float>(v0);
-
   map.per_u = static_cast<float>((map.columns - 1) / w);
   map.per_v = static_cast<float>((map.rows - 1) / h);
 
   std::vector<char> hidden;
   const double inset_u = std::min(0.012, 0.3 * w), inset_v = std::min(0.012, 0.3 * h);
 
+  // Nodes a little inside, away from adjoining faces.
   for (int j = 0; j < map.rows; ++j) {
     for (int i = 0; i < map.columns; ++i) {
       const double u = std::clamp(u0 + i / static_cast<double>(map.per_u), u0 + inset_u, u1 - inset_u);
@@ -142,6 +147,8 @@ LightMap light_face(const World& world, std::size_t index) {
       hidden.push_back(open < 0.0 ? 1 : 0);
       const double ambient = world.scene.ambient * std::max(0.0, open);
       const double glow = static_cast<double>(world.materials[index]->glow);
+
+      // Square root, as textures are encoded.
       map.nodes.push_back(static_cast<float>(std::sqrt(ambient + lamps_at(world, p, face) + glow)));
     }
   }

@@ -14,6 +14,8 @@ TexelScale texel_scale(const World& world, std::size_t face) {
   const Face& f = world.scene.faces[face];
   const cv::Size& top = world.texture_sizes[static_cast<std::size_t>(world.texture_of[face])];
   const double tile = world.tile_m[face];
+
+  // Tiled, unless stretched over the face.
   const bool tiled =
       f.stretch_u <= 0.0 || (world.options.texture == Texture::kNone && world.materials[face]->large);
   return {top.width / (tiled ? tile : f.stretch_u), top.height / (tiled ? tile : f.stretch_v)};
@@ -34,6 +36,7 @@ FaceView view_face(const World& world, std::size_t index, const sensor::Pinhole&
     return Vector3d(w.x() / k.fx, w.y() / k.fy, w.z() - w.x() * k.cx / k.fx - w.y() * k.cy / k.fy);
   };
 
+  // Inverse depth and texture coordinates are linear forms.
   const double h = n.dot(origin);
   const Vector3d c = through_pixels(n) / (std::abs(h) > 1e-9 ? h : 1e-9);
   const TexelScale scale = texel_scale(world, index);
@@ -87,38 +90,50 @@ class EdgeTiles {
   void add(Vector3d a, Vector3d b) {
     constexpr double kNear = 0.02;
     if (a.z() < kNear && b.z() < kNear) return;
+
+    // Clipped at the near plane.
     if (a.z() < kNear) a += (kNear - a.z()) / (b.z() - a.z()) * (b - a);
     if (b.z() < kNear) b += (kNear - b.z()) / (a.z() - b.z()) * (a - b);
     Spot from = project(a), to = project(b);
     if (std::abs(to.x - from.x) >= std::abs(to.y - from.y)) {
       if (from.x > to.x) std::swap(from, to);
-      march(from.x, from.y, to.x, to.y, from.inverse_depth, to.inverse_depth, columns_, rows_, 1, columns_);
+      march(from, to, {columns_, rows_, 1, columns_});
     } else {
       if (from.y > to.y) std::swap(from, to);
-      march(from.y, from.x, to.y, to.x, from.inverse_depth, to.inverse_depth, rows_, columns_, columns_, 1);
+      march({from.y, from.x, from.inverse_depth}, {to.y, to.x, to.inverse_depth},
+            {rows_, columns_, columns_, 1});
     }
   }
 
-  /// Walks from s0 to s1 along the edge's longer axis, tile by tile; t is the other coordinate, w the inverse
-  /// depth; all three change linearly over the picture.
-  void march(double s0, double t0, double s1, double t1, double w0, double w1, int along, int across,
-             int stride_s, int stride_t) {
+  /// Tiles along an edge's longer axis and across it, and how far apart neighbours are stored.
+  struct Axes {
+    int along, across, stride_along, stride_across;
+  };
+
+  /// Walks tile by tile along the edge's longer axis, which is x of both spots; y and the inverse depth
+  /// change linearly over the picture.
+  void march(const Spot& start, const Spot& stop, const Axes& axes) {
     constexpr double kMargin = 1.0;  // px
-    const double length = std::max(s1 - s0, 1e-9), slope = (t1 - t0) / length, rate = (w1 - w0) / length;
-    const double begin = std::max(s0 - kMargin, 0.0), end = std::min(s1 + kMargin, along * kTile - 1e-6);
+    const double length = std::max(stop.x - start.x, 1e-9), slope = (stop.y - start.y) / length,
+                 rate = (stop.inverse_depth - start.inverse_depth) / length;
+    const double begin = std::max(start.x - kMargin, 0.0),
+                 end = std::min(stop.x + kMargin, axes.along * kTile - 1e-6);
 
-    for (int i = static_cast<int>(begin / kTile); i < along && i * kTile <= end; ++i) {
-      const double from = std::max(begin, static_cast<double>(i * kTile)) - s0 - kMargin,
-                   to = std::min(end, static_cast<double>((i + 1) * kTile)) - s0 + kMargin;
-      const double ta = t0 + from * slope, tb = t0 + to * slope;
+    for (int i = static_cast<int>(begin / kTile); i < axes.along && i * kTile <= end; ++i) {
+      // The edge's part in this column of tiles.
+      const double from = std::max(begin, static_cast<double>(i * kTile)) - start.x - kMargin,
+                   to = std::min(end, static_cast<double>((i + 1) * kTile)) - start.x + kMargin;
+      const double ta = start.y + from * slope, tb = start.y + to * slope;
       const double low = std::min(ta, tb) - kMargin, high = std::max(ta, tb) + kMargin;
-      if (high < 0.0 || low >= across * kTile) continue;
+      if (high < 0.0 || low >= axes.across * kTile) continue;
 
+      // The nearest edge of each tile.
       const int first = static_cast<int>(std::max(low, 0.0) / kTile),
-                last = std::min(static_cast<int>(high / kTile), across - 1);
-      const auto w = static_cast<float>(std::max(w0 + from * rate, w0 + to * rate));
+                last = std::min(static_cast<int>(high / kTile), axes.across - 1);
+      const auto w =
+          static_cast<float>(std::max(start.inverse_depth + from * rate, start.inverse_depth + to * rate));
       for (int j = first; j <= last; ++j) {
-        float& nearest = nearest_[static_cast<std::size_t>(i * stride_s + j * stride_t)];
+        float& nearest = nearest_[static_cast<std::size_t>(i * axes.stride_along + j * axes.stride_across)];
         nearest = std::max(nearest, w);
       }
     }
@@ -175,6 +190,7 @@ void fill_between(const World& world, View& view) {
     const int* up = ids[y - y % 2];
     const int* low = cast_row || y + 1 >= h ? up : ids[y + 1];
 
+    // Four equal neighbours decide, else a ray.
     for (int x = cast_row ? 1 : 0; x < w; x += cast_row ? 2 : 1) {
       const int x0 = x - x % 2, x1 = x % 2 == 0 || x + 1 >= w ? x0 : x + 1;
       const int id = up[x0];
@@ -202,11 +218,13 @@ View look(const World& world, const sensor::Pinhole& camera, const geometry::Rig
   EdgeTiles edges(camera, camera_from_world);
   view.faces.reserve(world.scene.faces.size());
 
+  // Fixed faces, with their edges by tile.
   for (std::size_t i = 0; i < world.fixed_faces; ++i) {
     view.faces.push_back(view_face(world, i, camera, camera_from_world));
     edges.add(world.scene.faces[i]);
   }
 
+  // Moving faces, in the frame of their rest.
   for (const World::Mover& mover : world.movers) {
     const geometry::Rigid3 motion = world.motion(mover, time.value_or(0.0));
     geometry::Rigid3 camera_from_rest = camera_from_world;
@@ -218,10 +236,12 @@ View look(const World& world, const sensor::Pinhole& camera, const geometry::Rig
     }
   }
 
+  // Rays at the corners of tiles.
   view.ids.create(camera.height, camera.width);
   RayBatch rays(world, view);
   const cv::Mat1i corners = look_at_corners(rays, edges.columns(), edges.rows());
 
+  // Tiles that one face fills need no further rays.
   for (int row = 0; row < edges.rows(); ++row) {
     for (int column = 0; column < edges.columns(); ++column) {
       const cv::Rect tile =
@@ -240,6 +260,7 @@ View look(const World& world, const sensor::Pinhole& camera, const geometry::Rig
     }
   }
 
+  // Pixels in between, then moving faces.
   rays.flush();
   fill_between(world, view);
   if (time) MovingFaces(world, view, *time).draw(view);
@@ -256,6 +277,8 @@ cv::Mat1f exact_depth(const View& view) {
         row[x] = 0.0F;
         continue;
       }
+
+      // Inverse depth is linear in the image.
       const FaceView& f = view.faces[static_cast<std::size_t>(ids[x])];
       row[x] = 1.0F / (f.c[0] * static_cast<float>(x) + f.c[1] * static_cast<float>(y) + f.c[2]);
     }

@@ -42,7 +42,7 @@ class OnDemand {
   std::function<Value(std::size_t)> make_;
 };
 
-/// The same for values that take much memory: those that were not asked for longest are dropped, and made
+/// The same for values that take much memory: the least recently used ones are dropped, and made
 /// again if need be.
 template <typename Value>
 class Recent {
@@ -67,12 +67,16 @@ class Recent {
     const std::lock_guard lock(mutex_);
     if (!slot.value) bytes_ += size_(*made);
     slot.value = made;
+
+    // The least recently used values make room.
     while (bytes_ > most_) {
       Slot* oldest = nullptr;
       for (Slot& other : slots_) {
         if (other.value && &other != &slot && (oldest == nullptr || other.asked < oldest->asked))
           oldest = &other;
       }
+
+      // The new value alone may exceed the limit.
       if (oldest == nullptr) break;
       bytes_ -= size_(*oldest->value);
       oldest->value.reset();

@@ -67,6 +67,8 @@ std::vector<Sample> sample_path(const RobotPath& robot, double speed_factor) {
   constexpr int kSteps = 96;
   const auto& w = robot.waypoints;
   const long n = static_cast<long>(w.size()), segments = robot.closed ? n : n - 1;
+
+  // Open paths continue straight at their ends.
   const auto at = [&](long i) -> Vector3d {
     if (robot.closed) return w[static_cast<std::size_t>((i % n + n) % n)].position;
     if (i < 0) return 2.0 * w[0].position - w[1].position;
@@ -86,11 +88,13 @@ std::vector<Sample> sample_path(const RobotPath& robot, double speed_factor) {
       Sample p;
       p.position = catmull_rom(at(k - 1), at(k), at(k + 1), at(k + 2), s);
 
+      // Direction of travel, by differences.
       const double e = 0.5 / kSteps;
       const Vector3d ahead = catmull_rom(at(k - 1), at(k), at(k + 1), at(k + 2), std::min(1.0, s + e)) -
                              catmull_rom(at(k - 1), at(k), at(k + 1), at(k + 2), std::max(0.0, s - e));
       if (ahead.head<2>().norm() > 1e-6) tangent = ahead;
 
+      // Gaze turns smoothly between waypoints.
       const Direction from = wish(a, p.position, tangent), to = wish(b, p.position, tangent);
       const double blend = smoother(s);
       p.yaw = from.yaw + blend * wrap(to.yaw - from.yaw);
@@ -98,6 +102,7 @@ std::vector<Sample> sample_path(const RobotPath& robot, double speed_factor) {
       p.waypoint = static_cast<std::size_t>(k);
       p.time = 0.0;
 
+      // Translation or rotation, the slower one, limits the speed.
       if (!out.empty()) {
         const Sample& last = out.back();
         p.yaw = last.yaw + wrap(p.yaw - last.yaw);
@@ -122,17 +127,21 @@ CameraPath::CameraPath(const RobotPath& robot, const Options& options) : closed_
   step_ = duration_ / static_cast<double>(count);
   if (closed_) winding_ = samples.back().yaw - samples.front().yaw;
 
+  // Knots at equal steps of time.
   std::size_t k = 0;
   const long last = closed_ ? count - 1 : count;
   for (long i = 0; i <= last; ++i) {
     const double t = step_ * static_cast<double>(i);
     while (k + 2 < samples.size() && samples[k + 1].time < t) ++k;
+
+    // Interpolated between two samples.
     const Sample &a = samples[k], &b = samples[k + 1];
     const double s = std::clamp((t - a.time) / std::max(b.time - a.time, 1e-12), 0.0, 1.0);
     knots_.push_back({a.position + s * (b.position - a.position), a.yaw + s * (b.yaw - a.yaw),
                       a.pitch + s * (b.pitch - a.pitch), a.waypoint});
   }
 
+  // A round of whole frames, to repeat exactly.
   if (options.frame_s > 0.0) {
     duration_ = options.frame_s * std::max(1.0, std::round(duration_ / options.frame_s));
     step_ = duration_ / static_cast<double>(count);
@@ -144,6 +153,8 @@ CameraPath::CameraPath(const RobotPath& robot, const Options& options) : closed_
 
   add_sway(options);
   if (options.frame_s <= 0.0) return;
+
+  // Sway repeats with the round.
   const double once = 2.0 * M_PI / duration_;
   for (auto& axis : sway_) {
     for (Sine& s : axis) s.frequency = once * std::max(1.0, std::round(s.frequency / once));
@@ -159,17 +170,20 @@ void CameraPath::add_sway(const Options& options) {
     }
   };
 
+  // Wheels: small, fast vibration.
   if (options.wheeled) {
     for (std::size_t axis = 0; axis < 3; ++axis) add(axis, 0.0004, 5.0, 9.0, 2);
     for (std::size_t axis = 3; axis < 6; ++axis) add(axis, 0.0008, 3.0, 8.0, 3);
     return;
   }
 
+  // Held by hand: drift and steps.
   for (std::size_t axis = 0; axis < 3; ++axis) {
     add(axis, 0.018, 0.12, 0.45, 3);  // the arm drifts
     add(axis, 0.004, 1.4, 2.0, 2);    // steps
   }
 
+  // Held by hand: turns and tremor.
   for (std::size_t axis = 3; axis < 6; ++axis) {
     add(axis, axis == 3 ? 0.022 : 0.018, 0.12, 0.5, 3);
     add(axis, 0.0035, 1.2, 2.4, 2);
@@ -180,11 +194,14 @@ void CameraPath::add_sway(const Options& options) {
 CameraPath::Knot CameraPath::knot(long index) const {
   const long n = static_cast<long>(knots_.size());
   if (closed_) {
+    // Each round adds the turns of a whole one.
     const long round = index >= 0 ? index / n : -((-index + n - 1) / n);
     Knot k = knots_[static_cast<std::size_t>(index - round * n)];
     k.yaw += winding_ * static_cast<double>(round);
     return k;
   }
+
+  // Open paths run back and forth.
   const long period = 2 * (n - 1);
   long i = (index % period + period) % period;
   if (i >= n) i = period - i;
@@ -195,6 +212,8 @@ double CameraPath::pace(double t) const {
   double pace = 1.0;
   for (const Event& e : spins_) {
     const double end = e.start_s + e.duration_s;
+
+    // Slowed down before a spin, at rest during it.
     pace *= 1.0 - smoother((t - e.start_s + kRamp) / kRamp) * (1.0 - smoother((t - end) / kRamp));
   }
   return pace;
@@ -202,6 +221,8 @@ double CameraPath::pace(double t) const {
 
 double CameraPath::path_time(double t) const {
   double lost = 0.0;  // integral of 1 - pace, spins apart from each other
+
+  // Spins hold the camera on its path.
   for (const Event& e : spins_) {
     lost += kRamp * (smoother_integral((t - e.start_s + kRamp) / kRamp) -
                      smoother_integral((t - e.start_s - e.duration_s) / kRamp));
@@ -225,6 +246,7 @@ CameraPath::Knot CameraPath::spline(double t) const {
   const double weights[4] = {(1 - x) * (1 - x) * (1 - x) / 6.0, (3 * x * x * x - 6 * x * x + 4) / 6.0,
                              (-3 * x * x * x + 3 * x * x + 3 * x + 1) / 6.0, x * x * x / 6.0};
 
+  // A cubic B-spline smooths the knots.
   Knot sum{Vector3d::Zero(), 0.0, 0.0, 0};
   for (int k = 0; k < 4; ++k) {
     const Knot at = knot(i - 1 + k);
@@ -262,6 +284,8 @@ CameraPath camera_path(const Scene& scene, const SynthOptions& options, const st
   motion.speed = options.speed;
   motion.wheeled = (options.motion == Motion::kScene ? scene.motion : options.motion) == Motion::kWheeled;
   motion.seed = mix(static_cast<std::uint64_t>(options.seed), static_cast<std::uint64_t>(driver) + 1);
+
+  // Further robots start elsewhere on the same paths.
   const auto index = static_cast<std::size_t>(driver), paths = scene.robots.size(), rounds = index / paths;
   motion.start_share = 0.381966 * static_cast<double>(rounds);
   motion.events = events;

@@ -28,6 +28,8 @@ class RayBatch {
   }
   void flush() {
     if (count_ == 0) return;
+
+    // Copies fill the packet.
     for (int k = count_; k < World::kPacket; ++k) {
       dx_[k] = dx_[0];
       dy_[k] = dy_[0];

@@ -40,6 +40,8 @@ PLUMBLINE_INLINE Vec4 bilinear(const Texture2d::Level& level, float x, float y) 
   y -= 0.5F;
   const int ix = static_cast<int>(x) - (x < 0.0F ? 1 : 0), iy = static_cast<int>(y) - (y < 0.0F ? 1 : 0);
   const float sx = x - static_cast<float>(ix), sy = y - static_cast<float>(iy);
+
+  // Textures repeat; their sizes are powers of two.
   const auto x0 = static_cast<std::size_t>(ix & (level.width - 1)),
              x1 = static_cast<std::size_t>((ix + 1) & (level.width - 1));
   const std::uint32_t* top =
@@ -96,6 +98,7 @@ Footprint footprint(const Texture2d& texture, const FaceView& f, float x, float 
   out.coarse = &texture.levels[coarse];
   out.blend = out.probes > 1 ? 0.0F : level - static_cast<float>(fine);
 
+  // Factors from level 0 to the levels read.
   const auto width = static_cast<float>(texture.levels[0].width),
              height = static_cast<float>(texture.levels[0].height);
   out.fine_x = static_cast<float>(out.fine->width) / width;
@@ -106,11 +109,14 @@ Footprint footprint(const Texture2d& texture, const FaceView& f, float x, float 
 }
 
 PLUMBLINE_INLINE Vec4 sample(const Footprint& f, float u, float v) {
+  // Two levels of detail are blended.
   if (f.probes == 1) {
     const Vec4 fine = bilinear(*f.fine, u * f.fine_x, v * f.fine_y);
     if (f.blend == 0.0F) return fine;
     return fine + f.blend * (bilinear(*f.coarse, u * f.coarse_x, v * f.coarse_y) - fine);
   }
+
+  // Anisotropic: several probes along the footprint.
   Vec4 sum = {0.0F, 0.0F, 0.0F, 0.0F};
   float du = u - 0.5F * static_cast<float>(f.probes - 1) * f.step_x;
   float dv = v - 0.5F * static_cast<float>(f.probes - 1) * f.step_y;
@@ -167,6 +173,7 @@ class Shader {
                           const float (&spots)[4][2]) const {
     Vec4 sum = {0.0F, 0.0F, 0.0F, 0.0F};
     for (std::size_t k = 0; k < 4; ++k) {
+      // Each face once.
       bool done = false;
       for (std::size_t i = 0; i < k; ++i) done = done || faces[i] == faces[k];
       if (done) continue;
@@ -175,6 +182,7 @@ class Shader {
         continue;
       }
 
+      // All its places with one footprint.
       const auto id = static_cast<std::size_t>(faces[k]);
       const float sx = x + spots[k][0], sy = y + spots[k][1];
       const Footprint here = foot(id, sx, sy);
@@ -203,6 +211,7 @@ class Shader {
     const auto fy = static_cast<float>(y);
     int x = 0;
     while (x < view_.ids.cols) {
+      // Neighbours on one face share the footprint.
       int end = x + 1;
       while (end < view_.ids.cols && end < x + kChunk && ids[end] == ids[x]) ++end;
       chunk(ids[x], x, end, fy, bgr);
@@ -225,6 +234,8 @@ class Shader {
     const auto id = static_cast<std::size_t>(face);
     const auto x0 = static_cast<float>(from), x1 = static_cast<float>(to - 1);
     const Footprint here = foot(id, 0.5F * (x0 + x1), y);
+
+    // Light is linear within a chunk.
     const float start = brightness(id, x0, y);
     const float slope = to - from > 1 ? (brightness(id, x1, y) - start) / (x1 - x0) : 0.0F;
     for (int x = from; x < to; ++x) {
@@ -251,10 +262,13 @@ void smooth_borders(const World& world, const View& view, const Shader& shader, 
   const cv::Mat1i& ids = view.ids;
   std::vector<cv::Point> pixels;
 
+  // Pixels next to another face.
   for (int y = 0; y < ids.rows; ++y) {
     const int *row = ids[y], *up = ids[std::max(0, y - 1)], *low = ids[std::min(ids.rows - 1, y + 1)];
     for (int x = 0; x < ids.cols; ++x) {
       const int id = row[x];
+
+      // One of four neighbours is another face.
       if (up[x] != id || low[x] != id || row[std::max(0, x - 1)] != id ||
           row[std::min(ids.cols - 1, x + 1)] != id) {
         pixels.emplace_back(x, y);
@@ -262,6 +276,7 @@ void smooth_borders(const World& world, const View& view, const Shader& shader, 
     }
   }
 
+  // Four rays for each.
   std::vector<std::array<int, 4>> seen(pixels.size());
   RayBatch rays(world, view);
   for (std::size_t i = 0; i < pixels.size(); ++i) {
@@ -270,8 +285,9 @@ void smooth_borders(const World& world, const View& view, const Shader& shader, 
                &seen[i][k]);
     }
   }
-
   rays.flush();
+
+  // Moving faces may be in front.
   if (const MovingFaces moving(world, view, view.time.value_or(0.0)); view.time && !moving.empty()) {
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       for (std::size_t k = 0; k < 4; ++k) {
@@ -281,6 +297,7 @@ void smooth_borders(const World& world, const View& view, const Shader& shader, 
     }
   }
 
+  // Mean of the four places.
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     Shader::store(
         shader.mean(seen[i], static_cast<float>(pixels[i].x), static_cast<float>(pixels[i].y), kSpots) *

@@ -24,6 +24,8 @@ FigurePose Walker::pose(double t) const {
   const auto i = static_cast<std::size_t>(at);
   const double s = at - std::floor(at);
   const FigurePose &a = day[i], &b = day[i + 1];
+
+  // Between two poses of the day.
   FigurePose out;
   out.hip = a.hip + s * (b.hip - a.hip);
   out.yaw = a.yaw + s * wrap(b.yaw - a.yaw);
@@ -42,11 +44,13 @@ std::array<geometry::Rigid3, kParts> part_frames(const FigurePose& pose, bool ca
     return Eigen::AngleAxisd(angle, axis).toRotationMatrix();
   };
 
+  // The trunk defines the frame of all joints.
   std::array<geometry::Rigid3, kParts> out;
   const geometry::Rigid3 trunk = upright(pose.hip, pose.yaw);
   out[kTrunk] = trunk;
   double ahead[2];
 
+  // The leg from hip to foot.
   for (const int side : {0, 1}) {
     const double y = side == 0 ? 1.0 : -1.0;
     const Vector3d joint(0.0, 0.09 * y, 0.0);
@@ -92,20 +96,22 @@ void add_walker(Builder& b, const Walker& walker, int part) {
   b.begin_object("walker", "", walker.mark);
   const Skin clothes{walker.material}, skin{"terracotta"}, trousers{"fabric"};
   if (walker.day.empty()) {
+    // Without a day's poses: a simple figure.
     const Vector3d way = walker.to - walker.from;
     const geometry::Rigid3 frame = upright(walker.from, std::atan2(way.y(), way.x()));
     b.box(frame, {-0.15, -0.25, 0.0}, {0.15, 0.25, 1.42}, clothes);
     b.box(frame, {-0.1, -0.09, 1.42}, {0.12, 0.09, 1.7}, skin);
-
     return;
   }
 
+  // One part of a figure with limbs.
   const geometry::Rigid3 frame =
       part_frames(walker.day.front(), walker.carries)[static_cast<std::size_t>(part)];
+
+  // Trunk and head, thigh, shin with shoe, or arm.
   if (part == kTrunk) {
     b.box(frame, {-0.11, -0.2, -0.08}, {0.11, 0.2, 0.56}, clothes);
     b.box(frame, {-0.1, -0.08, 0.58}, {0.11, 0.08, 0.86}, skin);
-
     if (walker.carries) b.box(frame, {0.3, -0.2, 0.08}, {0.6, 0.2, 0.34}, {"cardboard"});
   } else if (part < kShin) {
     b.box(frame, {-0.08, -0.075, -kLimb - 0.03}, {0.08, 0.075, 0.05}, trousers);
@@ -130,6 +136,8 @@ float inverse_depth(const View& view, int face, float x, float y) {
 int MovingFaces::nearer(const View& view, const Spot& spot, int best, float x, float y) const {
   const float here = inverse_depth(view, static_cast<int>(spot.face), x, y);
   if (here <= inverse_depth(view, best, x, y)) return best;
+
+  // The hit, in the frame of the face at rest.
   const Vector3d ray = view.world_from_camera.rotation * view.camera.unproject(x, y, 1.0);
   const Face& face = world_.scene.faces[spot.face];
   const Vector3d d =
@@ -168,6 +176,7 @@ MovingFaces::MovingFaces(const World& world, const View& view, double t) : world
                         static_cast<int>(std::clamp(pixel.y(), -1e6, 1e6)) - 2, 5, 5);
       };
 
+      // Outline clipped at the near plane.
       Vector3d before =
           camera_from_world * (motion * face.at(face.polygon.back().x(), face.polygon.back().y()));
       for (const Eigen::Vector2d& uv : face.polygon) {

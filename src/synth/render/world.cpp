@@ -24,6 +24,8 @@ World::World(Scene s, SynthOptions o) : scene(std::move(s)), options(std::move(o
   if (auto more = parse_events(options.events)) events.insert(events.end(), more->begin(), more->end());
   fixed_faces = scene.faces.size();
   const std::size_t walkers = std::min(scene.walkers.size(), static_cast<std::size_t>(options.walkers));
+
+  // People consist of moving parts.
   for (std::size_t i = 0; i < walkers; ++i) {
     for (int part = 0; part < walker_parts(scene.walkers[i]); ++part) {
       const std::size_t first = scene.faces.size();
@@ -39,6 +41,8 @@ World::World(Scene s, SynthOptions o) : scene(std::move(s)), options(std::move(o
     const MovingDoor& door = scene.moving_doors[i];
     const DoorLeaf& leaf = scene.leaves[door.leaf];
     movers.push_back({i, -1, scene.faces.size(), leaf.count + door.body.size()});
+
+    // Copies at the place where their light is computed.
     for (std::size_t k = leaf.first; k < leaf.first + leaf.count; ++k) {
       gone[k] = 1;
       scene.faces.push_back(Face(scene.faces[k]));
@@ -66,6 +70,7 @@ void World::build_bvh() {
   rtcSetSceneFlags(bvh_, RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(bvh_, RTC_BUILD_QUALITY_HIGH);
 
+  // Sizes of the buffers.
   std::size_t vertices = 0, triangles = 0;
   for (std::size_t i = 0; i < fixed_faces; ++i) {
     if (gone[i] != 0) continue;
@@ -73,6 +78,7 @@ void World::build_bvh() {
     triangles += scene.faces[i].polygon.size() - 2;
   }
 
+  // Embree owns the buffers.
   RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* v = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
                                                         RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertices));
@@ -80,6 +86,7 @@ void World::build_bvh() {
       geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), triangles));
   if (v == nullptr || t == nullptr) throw std::bad_alloc();
 
+  // Corners of each face.
   unsigned base = 0;
   for (std::size_t i = 0; i < fixed_faces; ++i) {
     if (gone[i] != 0) continue;
@@ -89,6 +96,7 @@ void World::build_bvh() {
       for (int k = 0; k < 3; ++k) *v++ = static_cast<float>(p[k]);
     }
 
+    // Convex polygons are fans of triangles.
     const auto corners = static_cast<unsigned>(face.polygon.size());
     for (unsigned k = 1; k + 1 < corners; ++k) {
       *t++ = base;
@@ -100,6 +108,7 @@ void World::build_bvh() {
     base += corners;
   }
 
+  // The geometry belongs to the tree.
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(bvh_, geometry);
   rtcReleaseGeometry(geometry);
@@ -123,6 +132,8 @@ geometry::Rigid3 World::motion(const Mover& mover, double t) const {
     swung.translation = (door.angle(t) - door.lit) * door.slide;
     return swung;
   }
+
+  // Doors turn about the hinge.
   swung.rotation = Eigen::AngleAxisd(leaf.open_rad - door.angle(t), Vector3d::UnitZ()).toRotationMatrix();
   swung.translation = leaf.hinge - swung.rotation * leaf.hinge;
   return swung;
@@ -131,14 +142,17 @@ geometry::Rigid3 World::motion(const Mover& mover, double t) const {
 Hit World::cast(const Vector3d& origin, const Vector3d& direction, double far) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
+
+  // Embree takes single precision.
   RTCRayHit query{};
   query.ray.org_x = static_cast<float>(origin.x());
   query.ray.org_y = static_cast<float>(origin.y());
   query.ray.org_z = static_cast<float>(origin.z());
   query.ray.dir_x = static_cast<float>(direction.x());
-
   query.ray.dir_y = static_cast<float>(direction.y());
   query.ray.dir_z = static_cast<float>(direction.z());
+
+  // All geometry, up to a distance.
   query.ray.tfar = static_cast<float>(far);
   query.ray.mask = 0xffffffffU;
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
@@ -146,6 +160,7 @@ Hit World::cast(const Vector3d& origin, const Vector3d& direction, double far) c
   Hit hit;
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return hit;
 
+  // The face, and the side that was hit.
   hit.face = face_of_triangle_[query.hit.primID];
   hit.distance = static_cast<double>(query.ray.tfar);
   hit.front = scene.faces[static_cast<std::size_t>(hit.face)].normal.dot(direction) < 0.0;
@@ -171,6 +186,7 @@ void World::cast_packet(const float origin[3], const float* dx, const float* dy,
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   alignas(64) RTCRayHit16 q;
 
+  // All rays start at one place.
   for (int k = 0; k < kPacket; ++k) {
     q.ray.org_x[k] = origin[0];
     q.ray.org_y[k] = origin[1];
@@ -180,6 +196,7 @@ void World::cast_packet(const float origin[3], const float* dx, const float* dy,
     q.ray.dir_z[k] = dz[k];
     q.ray.tnear[k] = 0.0F;
 
+    // No limit of distance, no hit yet.
     q.ray.tfar[k] = std::numeric_limits<float>::infinity();
     q.ray.time[k] = 0.0F;
     q.ray.mask[k] = 0xffffffffU;
@@ -204,6 +221,7 @@ void World::prepare_textures() {
     double aspect;
   };
 
+  // One texture per material, print and shape.
   std::vector<Job> jobs;
   std::map<std::tuple<std::string, int, int>, int> known;
   texture_of.resize(scene.faces.size());
@@ -220,12 +238,14 @@ void World::prepare_textures() {
                                      static_cast<int>(std::lround(16.0 * std::log2(std::max(aspect, 1e-3)))));
     const auto [entry, fresh] = known.emplace(key, static_cast<int>(jobs.size()));
 
+    // The seed depends on the name, not on the order.
     if (fresh) {
       std::uint64_t name_hash = 0;
       for (const char letter : face.material) name_hash = mix(name_hash, static_cast<std::uint64_t>(letter));
       jobs.push_back({materials[i], mix(seed, name_hash, static_cast<std::uint64_t>(variant)), aspect});
     }
 
+    // Tiled textures begin anywhere.
     texture_of[i] = entry->second;
     tile_m.push_back(worn(*materials[i], options.texture).tile_m);
     if (tiled) {
@@ -237,6 +257,8 @@ void World::prepare_textures() {
 
   for (const Job& job : jobs)
     texture_sizes.push_back(texture_size(*job.material, options.texture, job.aspect));
+
+  // Textures are drawn when they are first needed.
   constexpr std::size_t kMostBytes = 96U << 20U;
   const auto draw = [jobs, texture = options.texture](std::size_t k) {
     return draw_texture(*jobs[k].material, texture, jobs[k].seed, jobs[k].aspect);
@@ -252,12 +274,12 @@ void World::prepare_textures() {
 core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const SynthOptions& options,
                                                        const core::Executor&) {
   if (auto ok = check(options); !ok) return tl::unexpected<core::Error>(ok.error());
+
+  // Surfaces, robots and known materials are needed.
   if (scene.faces.empty())
     return core::usage_error(fmt::format("scene '{}' has no surfaces; add `objects:`", scene.name));
-
   if (scene.robots.empty())
     return core::usage_error(fmt::format("scene '{}' has no robots; add `robots:`", scene.name));
-
   for (const Face& face : scene.faces) {
     if (find_material(face.material) == nullptr) {
       return core::usage_error(fmt::format("scene '{}': no material '{}'", scene.name, face.material));
@@ -268,6 +290,8 @@ core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const
     return core::usage_error(fmt::format(
         "moving_doors: doors swing in worlds made from a number (layout), not in scene '{}'", scene.name));
   }
+
+  // Doors and people that the options add.
   Scene peopled = scene;
   choose_moving_doors(options, peopled);
   if (!add_people(options.walkers, options.seed, peopled)) {
@@ -277,6 +301,7 @@ core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const
                     scene.name, scene.walkers.size(), options.walkers));
   }
 
+  // Cameras must not run into anything.
   auto world = std::make_shared<World>(std::move(peopled), options);
   if (auto free = check_paths(world); !free) return tl::unexpected<core::Error>(free.error());
   world->prepare_textures();

@@ -28,6 +28,8 @@ struct LightMap {
 
   [[nodiscard]] float at(float u, float v) const {
     float x = (u - u0) * per_u, y = (v - v0) * per_v;
+
+    // Constant beyond the border.
     x = x < 0.0F ? 0.0F : (x > static_cast<float>(columns - 1) ? static_cast<float>(columns - 1) : x);
     y = y < 0.0F ? 0.0F : (y > static_cast<float>(rows - 1) ? static_cast<float>(rows - 1) : y);
     int ix = static_cast<int>(x), iy = static_cast<int>(y);

@@ -52,6 +52,7 @@ void Builder::polygon(const std::vector<Vector3d>& corners, const Vector3d& u_hi
   face.v_axis = face.normal.cross(face.u_axis);
   face.origin = corners[0];
 
+  // Corners in the plane of the face.
   for (const Vector3d& corner : corners) {
     const Vector3d d = corner - face.origin;
     face.polygon.emplace_back(d.dot(face.u_axis), d.dot(face.v_axis));
@@ -65,6 +66,7 @@ void Builder::polygon(const std::vector<Vector3d>& corners, const Vector3d& u_hi
   face.material = skin.material;
   face.seed = skin.seed >= 0 ? skin.seed : seed_;
 
+  // Prints cover the whole face.
   if (skin.stretched) {
     face.stretch_u = bounds.sizes().x();
     face.stretch_v = bounds.sizes().y();
@@ -83,6 +85,7 @@ void Builder::anchor(Face& face, const Vector3d& foot) {
 
 void Builder::box(const Rigid3& f, const Vector3d& lo, const Vector3d& hi, const Skin& skin,
                   const Skin* front) {
+  // Corners by their end of each axis: 0 low, 1 high.
   const auto p = [&](int x, int y, int z) {
     return f * Vector3d(x ? hi.x() : lo.x(), y ? hi.y() : lo.y(), z ? hi.z() : lo.z());
   };
@@ -96,20 +99,23 @@ void Builder::box(const Rigid3& f, const Vector3d& lo, const Vector3d& hi, const
   polygon({p(0, 1, 0), p(1, 1, 0), p(1, 0, 0), p(0, 0, 0)}, ux, skin);   // bottom, -z
 }
 
-void Builder::cylinder(const Rigid3& f, const Vector3d& bottom, double radius, double top_radius,
-                       double height, int segments, const Skin& skin) {
+void Builder::cylinder(const Rigid3& f, const Cylinder& of, const Skin& skin) {
   const auto ring = [&](int i, double r, double z) {
-    const double angle = 2.0 * M_PI * i / segments;
-    return Vector3d(f * (bottom + Vector3d(r * std::cos(angle), r * std::sin(angle), z)));
+    const double angle = 2.0 * M_PI * i / of.segments;
+    return Vector3d(f * (of.bottom + Vector3d(r * std::cos(angle), r * std::sin(angle), z)));
   };
+
+  // Sides, collecting both rims.
   std::vector<Vector3d> top, foot;
-  for (int i = 0; i < segments; ++i) {
-    const Vector3d a = ring(i, radius, 0.0), b = ring(i + 1, radius, 0.0);
-    const Vector3d c = ring(i + 1, top_radius, height), d = ring(i, top_radius, height);
+  for (int i = 0; i < of.segments; ++i) {
+    const Vector3d a = ring(i, of.radius, 0.0), b = ring(i + 1, of.radius, 0.0);
+    const Vector3d c = ring(i + 1, of.top_radius, of.height), d = ring(i, of.top_radius, of.height);
     polygon({a, b, c, d}, b - a, skin);
     top.push_back(d);
     foot.insert(foot.begin(), a);
   }
+
+  // Polygons close both ends.
   const Vector3d u = f.rotation.col(0);
   polygon(top, u, skin);
   polygon(foot, u, skin);

@@ -24,6 +24,21 @@ struct Skin {
   int seed = -1;           ///< -1: the object's
 };
 
+/// Upright cylinder or cone frustum.
+struct Cylinder {
+  Eigen::Vector3d bottom{0, 0, 0};                      ///< its centre
+  double radius = 0.1, top_radius = 0.1, height = 1.0;  ///< m
+  int segments = 24;
+};
+
+/// Flat thing on a wall: a print on a board.
+struct Panel {
+  double width = 0.6, height = 0.85, thickness = 0.008;  ///< m
+  std::string print;                                     ///< material of its front
+  std::string rim;                                       ///< material of all else
+  bool bars = false;                                     ///< a frame around the print
+};
+
 /// Adds faces of one object after the other to a scene.
 class Builder {
  public:
@@ -43,9 +58,7 @@ class Builder {
   void box(const geometry::Rigid3& world_from_box, const Eigen::Vector3d& lo, const Eigen::Vector3d& hi,
            const Skin& skin, const Skin* front = nullptr);
 
-  /// Upright cylinder or cone frustum in the frame: bottom centre, radii at bottom and top.
-  void cylinder(const geometry::Rigid3& world_from_cylinder, const Eigen::Vector3d& bottom, double radius,
-                double top_radius, double height, int segments, const Skin& skin);
+  void cylinder(const geometry::Rigid3& world_from_cylinder, const Cylinder& cylinder, const Skin& skin);
 
  private:
   Scene& scene_;
@@ -72,9 +85,8 @@ void add_ceiling_lamp(Builder& b, const geometry::Rigid3& frame, double width, d
 void add_clutter(Builder& b, const geometry::Rigid3& frame, double width, double depth, int count);
 void add_curtain(Builder& b, const geometry::Rigid3& frame, double width, double height, double fold,
                  const std::string& material);
-/// Flat thing on a wall, centre of its back at the frame's origin, front to -y.
-void add_panel(Builder& b, const geometry::Rigid3& frame, double width, double height, double thickness,
-               const std::string& material, const std::string& rim, bool frame_bars);
+/// Centre of its back at the frame's origin, front to -y.
+void add_panel(Builder& b, const geometry::Rigid3& frame, const Panel& panel);
 
 // ---- walker.cpp ----
 

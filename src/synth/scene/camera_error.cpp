@@ -31,6 +31,7 @@ CameraError draw_error(std::uint64_t seed, int robot, int width) {
 }  // namespace
 
 core::Result<CameraError> camera_error(const std::string& text, int robot, int width) {
+  // A number draws errors, a list states them.
   if (!text.empty() && text.find_first_not_of("0123456789") == std::string::npos && text.size() < 10)
     return draw_error(std::stoull(text), robot, width);
 

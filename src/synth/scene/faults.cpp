@@ -58,6 +58,8 @@ core::Result<ColorFaults> color_faults(const std::string& text) {
 core::Result<ImuModel> imu_model(const std::string& given) {
   std::string text = given;
   ImuModel m;
+
+  // Ideal sensors have no errors.
   if (is_ideal(text)) m = {200.0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
   const core::Range<double> some{0.0, 10.0};
 
@@ -81,6 +83,8 @@ core::Result<ImuModel> imu_model(const std::string& given) {
 core::Result<OdometryModel> odometry_model(const std::string& given) {
   std::string text = given;
   OdometryModel m;
+
+  // Ideal wheels have no errors.
   if (is_ideal(text)) m = {50.0, 0, 0, 0, 0};
   const core::Range<double> share{0.0, 0.5};
   const auto read = read_settings("odometry", text,

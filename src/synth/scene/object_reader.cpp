@@ -111,11 +111,15 @@ bool read_opening(const ConfigNode& node, const std::string& path, bool window, 
   ObjectReader r(node, path, problems);
   o.window = window;
   o.mark = node.mark;
+
+  // Usual size of a window.
   if (window) {
     o.width = 1.2;
     o.bottom = 0.9;
     o.height = 1.2;
   }
+
+  // Settings by the kind of opening.
   bool leaf = true;
   r.length("at", o.at, 0.0, 500.0).length("width", o.width, 0.1, 50.0).length("bottom", o.bottom, 0.0, 20.0);
   r.length("height", o.height, 0.1, 20.0);
@@ -143,6 +147,8 @@ void read_openings(const Context& c, const char* key, bool window, Wall& wall) {
 
 void check_openings(const Context& c, Wall& wall) {
   const double length = (wall.to - wall.from).norm();
+
+  // In order along the wall, without overlap.
   std::sort(wall.openings.begin(), wall.openings.end(),
             [](const Opening& a, const Opening& b) { return a.at < b.at; });
   double end = 0.0;
@@ -168,6 +174,7 @@ void read_wall(const Context& c) {
   r.material("material", wall.material).material("skirting", wall.skirting);
   if (!r.read({"doors", "windows"})) return;
 
+  // A wall needs a length.
   wall.from = {from[0], from[1]};
   wall.to = {to[0], to[1]};
   if ((wall.to - wall.from).norm() < 0.01) {
@@ -176,6 +183,7 @@ void read_wall(const Context& c) {
     return;
   }
 
+  // Openings are checked before anything is built.
   const std::size_t before = c.problems.size();
   read_openings(c, "doors", false, wall);
   read_openings(c, "windows", true, wall);
@@ -191,17 +199,20 @@ void read_panels(const Context& c) {
   wall.height = 2.0;
   wall.material = "cloth";
 
+  // Settings of all panels.
   ObjectReader r(c.node, c.path, c.problems);
   r.length("height", wall.height, 0.01, 50.0).length("bottom", wall.bottom, -50.0, 50.0);
   r.length("thickness", wall.thickness, 0.001, 5.0).material("material", wall.material);
   if (!r.read({"points"})) return;
 
+  // At least two corners.
   const ConfigNode* list = c.node.find("points");
   if (list == nullptr || list->kind != ConfigNode::Kind::kSequence || list->items.size() < 2) {
     r.problem(c.node.mark, "needs 'points', a list of at least two [x, y]");
     return;
   }
 
+  // Corners, each away from the one before.
   std::vector<Vector2d> points;
   for (std::size_t i = 0; i < list->items.size(); ++i) {
     core::OptionTable table;
@@ -218,6 +229,7 @@ void read_panels(const Context& c) {
     }
   }
 
+  // Adjoining panels share mitred corners.
   for (std::size_t i = 0; i + 1 < points.size(); ++i) {
     c.builder.begin_object(c.type, r.name.empty() ? "" : fmt::format("{} {}", r.name, i + 1), c.node.mark);
     add_zigzag_panel(c.builder, wall, points, i);
@@ -233,6 +245,8 @@ void read_slab(const Context& c) {
   r.point("from", from, 2).point("to", to, 2).length(floor ? "z" : "height", z, -50.0, 50.0);
   r.material("material", material);
   if (!r.read()) return;
+
+  // Opposite corners, in any order.
   const Vector2d lo(std::min(from[0], to[0]), std::min(from[1], to[1]));
   const Vector2d hi(std::max(from[0], to[0]), std::max(from[1], to[1]));
   if ((hi - lo).minCoeff() < 0.01) {
@@ -240,6 +254,8 @@ void read_slab(const Context& c) {
     return;
   }
   c.builder.begin_object(c.type, r.name, c.node.mark);
+
+  // The thickness is outside the room.
   const double z0 = floor ? z - 0.1 : z, z1 = floor ? z : z + 0.1;
   c.builder.box({}, {lo.x(), lo.y(), z0}, {hi.x(), hi.y(), z1}, {material});
 }
@@ -270,8 +286,9 @@ void read_cylinder(const Context& c) {
   r.point("at", at, 3).length("radius", radius, 0.001, 50.0).length("top_radius", top_radius, 0.001, 50.0);
   r.length("height", height, 0.001, 50.0).count("segments", segments, 3, 256).material("material", material);
   if (!begin(c, r)) return;
-  c.builder.cylinder(upright(to3(at), 0.0), Vector3d::Zero(), radius, top_radius > 0.0 ? top_radius : radius,
-                     height, segments, {material});
+  c.builder.cylinder(upright(to3(at), 0.0),
+                     {Vector3d::Zero(), radius, top_radius > 0.0 ? top_radius : radius, height, segments},
+                     {material});
 }
 
 /// Posters, whiteboards, signs and pictures: flat things that hang; yaw 0 looks to -y.
@@ -284,23 +301,23 @@ void read_panel(const Context& c) {
   std::string material = c.type == "whiteboard" ? "whiteboard" : c.type == "sign" ? "sign" : "poster";
   if (c.type == "picture") material = "picture";
 
+  // Settings, with usual values by type.
   ObjectReader r(c.node, c.path, c.problems);
   r.point("at", at, 3).size("size", size, 2).angle("yaw", yaw).length("thickness", thickness, 0.001, 0.5);
   r.material("material", material).count("seed", seed, 0, 1 << 20);
   if (!begin(c, r)) return;
 
+  // The print is the first face added.
   const std::size_t first = c.builder.scene().faces.size();
   const bool framed = c.type == "whiteboard" || c.type == "picture";
-  add_panel(c.builder, upright(to3(at), yaw), size[0], size[1], thickness, material,
-            c.type == "picture" ? "wood_dark"
-            : framed            ? "metal"
-                                : "paint_white",
-            framed);
+  const char* rim = c.type == "picture" ? "wood_dark" : framed ? "metal" : "paint_white";
+  add_panel(c.builder, upright(to3(at), yaw), {size[0], size[1], thickness, material, rim, framed});
   if (seed >= 0) c.builder.scene().faces[first].seed = seed;
 }
 
 /// Furniture that stands at [x, y] or [x, y, z].
 void read_furniture(const Context& c) {
+  // Usual sizes and materials.
   static const std::map<std::string, std::vector<double>> kSizes = {
       {"desk", {1.5, 0.75, 0.74}}, {"table", {1.2, 0.7, 0.72}},   {"shelf", {0.9, 0.32, 1.9}},
       {"sofa", {1.9, 0.9, 0.85}},  {"cabinet", {0.9, 0.45, 0.8}},
@@ -311,6 +328,7 @@ void read_furniture(const Context& c) {
       {"sofa", "sofa"}, {"cabinet", "wood_dark"}, {"chair", "fabric"},
   };
 
+  // Settings of all furniture.
   std::vector<double> at, size = kSizes.count(c.type) != 0 ? kSizes.at(c.type) : std::vector<double>{};
   double yaw = 0.0;
   bool books = true;
@@ -319,11 +337,13 @@ void read_furniture(const Context& c) {
   ObjectReader r(c.node, c.path, c.problems);
   r.point("at", at, 0).angle("yaw", yaw).material("material", material);
 
+  // Settings of some types.
   if (!size.empty()) r.size("size", size, 3);
   if (c.type == "shelf") r.flag("books", books);
   if (c.type == "cabinet") r.count("doors", doors, 1, 8);
   if (!r.read()) return;
 
+  // Height 0 unless given.
   if (at.size() != 2 && at.size() != 3) {
     r.problem(c.node.mark, "'at' is [x, y] or [x, y, z]");
     return;
@@ -350,6 +370,7 @@ void read_thing(const Context& c) {
   ObjectReader r(c.node, c.path, c.problems);
   r.point("at", at, 3).angle("yaw", yaw);
 
+  // Settings depend on the type.
   if (c.type == "monitor") r.length("width", width, 0.1, 5.0).flag("stand", stand);
   if (c.type == "plant") r.length("height", height, 0.2, 5.0);
   if (c.type == "lamp") r.length("width", width, 0.05, 5.0).length("depth", depth, 0.05, 5.0).power(power);
@@ -372,6 +393,7 @@ void read_thing(const Context& c) {
   }
   if (!begin(c, r)) return;
 
+  // The thing itself, by its type.
   const geometry::Rigid3 frame = upright(to3(at), yaw);
   if (c.type == "monitor") add_monitor(c.builder, frame, width, stand);
   if (c.type == "plant") add_plant(c.builder, frame, height);
@@ -405,9 +427,11 @@ void read_objects(const ConfigNode& list, Builder& builder, ConfigProblems& prob
     return;
   }
 
+  // All names, to suggest the most similar one.
   std::vector<std::string> types;
   for (const auto& [type, unused] : object_readers()) types.push_back(type);
 
+  // Each item is a type with its settings.
   for (std::size_t i = 0; i < list.items.size(); ++i) {
     const ConfigNode& item = list.items[i];
     const std::string path = fmt::format("objects[{}]", i);
@@ -416,6 +440,7 @@ void read_objects(const ConfigNode& list, Builder& builder, ConfigProblems& prob
       continue;
     }
 
+    // Unknown types, with the most similar one.
     const auto& [type, body] = item.entries.front();
     const auto reader = object_readers().find(type);
     if (reader == object_readers().end()) {

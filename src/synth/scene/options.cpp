@@ -151,6 +151,8 @@ core::Result<Event> parse_event(const std::string& text) {
   const auto at = text.find('@'), plus = text.find('+', at == std::string::npos ? 0 : at),
              star = text.find('*');
   const std::string name = trim(text.substr(0, at));
+
+  // Names are collected for a hint.
   std::vector<std::string> names;
   const KindName* kind = nullptr;
   for (const KindName& k : kKinds) {
@@ -163,6 +165,7 @@ core::Result<Event> parse_event(const std::string& text) {
         fmt::format("events: '{}' is not a kind of event{}", name, core::hint(name, names)));
   }
 
+  // Numbers between the separators.
   Event event{kind->kind, 0.0, 0.0, kind->default_value};
   const bool formed =
       at != std::string::npos && plus != std::string::npos && (star == std::string::npos || star > plus) &&
@@ -199,6 +202,7 @@ core::Result<std::vector<Event>> parse_events(const std::string& text) {
 }
 
 core::Result<void> check(const SynthOptions& options) {
+  // Ranges of numbers.
   if (options.frames == 0)
     return core::usage_error("frames: zero frames are not a recording (-1: the path once)");
   if (options.robots < 1) return core::usage_error("robots: at least 1 is needed");
@@ -206,10 +210,11 @@ core::Result<void> check(const SynthOptions& options) {
     return core::usage_error("width, height: at least 64 x 48 pixels");
   if (!(options.fps > 0.0) || !(options.speed > 0.0))
     return core::usage_error("fps, speed: must be positive");
+
+  // Texts with settings must be readable.
   if (auto events = parse_events(options.events); !events) return tl::unexpected<core::Error>(events.error());
   if (auto faults = depth_faults(options.depth_faults); !faults)
     return tl::unexpected<core::Error>(faults.error());
-
   if (auto faults = color_faults(options.color_faults); !faults)
     return tl::unexpected<core::Error>(faults.error());
   if (auto imu = imu_model(options.imu); !imu) return tl::unexpected<core::Error>(imu.error());
@@ -217,6 +222,7 @@ core::Result<void> check(const SynthOptions& options) {
     return tl::unexpected<core::Error>(wheels.error());
   if (auto rig = read_rig(options); !rig) return tl::unexpected<core::Error>(rig.error());
 
+  // Settings that belong together.
   if ((options.depth_width > 0) != (options.depth_height > 0))
     return core::usage_error("depth_width, depth_height: give both or none");
   if (auto error = camera_error(options.camera_error, 0, options.width); !error)

@@ -18,6 +18,7 @@ core::Result<std::vector<geometry::Rigid3>> read_rig(const SynthOptions& options
   if (!root) return tl::unexpected<core::Error>(root.error());
   const core::ConfigNode* list = root->find("cameras");
 
+  // Problems are collected, to report all at once.
   core::ConfigProblems problems;
   std::vector<geometry::Rigid3> cameras;
   if (list == nullptr || list->items.empty() || list->items.size() > 16) {
@@ -25,6 +26,7 @@ core::Result<std::vector<geometry::Rigid3>> read_rig(const SynthOptions& options
     return tl::unexpected<core::Error>(core::to_error(problems));
   }
 
+  // Place and direction of each camera.
   for (const core::ConfigNode& item : list->items) {
     std::vector<double> at(3, 0.0);
     double yaw = 0.0, pitch = 0.0, roll = 0.0;
@@ -36,6 +38,7 @@ core::Result<std::vector<geometry::Rigid3>> read_rig(const SynthOptions& options
     table.set_all(item, "cameras", problems);
     if (at.size() != 3) continue;
 
+    // Body: x ahead, y to the left, z up.
     const Eigen::Quaterniond turn = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
                                     Eigen::AngleAxisd(-pitch, Eigen::Vector3d::UnitY()) *
                                     Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX());

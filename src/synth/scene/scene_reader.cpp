@@ -28,6 +28,7 @@ bool read_waypoint(const ConfigNode& node, const std::string& path, double heigh
   table.number("pitch", w.pitch_rad, {-1.5, 1.5}, "rad", "Angle by which the camera looks up");
   table.number("yaw", w.yaw_rad, {-7.0, 7.0}, "rad", "Angle by which the camera looks left");
 
+  // The short form is the position alone.
   if (node.kind == ConfigNode::Kind::kSequence) {
     table.set("at", node, path, problems);
   } else {
@@ -40,6 +41,7 @@ bool read_waypoint(const ConfigNode& node, const std::string& path, double heigh
     return false;
   }
 
+  // Height of the path unless given.
   w.position = {at[0], at[1], at.size() == 3 ? at[2] : height};
   if (!look.empty()) w.look = Vector3d(look[0], look[1], look[2]);
   return true;
@@ -50,6 +52,7 @@ void read_robot(const ConfigNode& node, std::size_t index, RobotPath& robot, Con
   double height = 1.3, pitch = 0.0;
   robot.name = fmt::format("robot{}", index);
 
+  // Settings of the robot.
   core::OptionTable table;
   table.text("name", robot.name, "Name");
   table.boolean("closed", robot.closed, "Close the path from its last waypoint to the first");
@@ -64,6 +67,7 @@ void read_robot(const ConfigNode& node, std::size_t index, RobotPath& robot, Con
     return;
   }
 
+  // A path of two waypoints or more.
   table.set_all(node, path, problems, {"path"});
   const ConfigNode* list = node.find("path");
   if (list == nullptr || list->kind != ConfigNode::Kind::kSequence || list->items.size() < 2) {
@@ -71,6 +75,7 @@ void read_robot(const ConfigNode& node, std::size_t index, RobotPath& robot, Con
     return;
   }
 
+  // Waypoints that cannot be read are reported.
   for (std::size_t i = 0; i < list->items.size(); ++i) {
     Waypoint w;
     if (!read_waypoint(list->items[i], fmt::format("{}.path[{}]", path, i), height, pitch, w, problems))
@@ -81,11 +86,11 @@ void read_robot(const ConfigNode& node, std::size_t index, RobotPath& robot, Con
     robot.waypoints.push_back(w);
   }
 
+  // The camera must move.
   double length = 0.0;
   for (std::size_t i = 1; i < robot.waypoints.size(); ++i) {
     length += (robot.waypoints[i].position - robot.waypoints[i - 1].position).norm();
   }
-
   if (robot.waypoints.size() == list->items.size() && length < 0.01) {
     problems.push_back({list->mark, path + ".path", "all waypoints are the same place"});
   }
@@ -116,6 +121,7 @@ void read_walkers(const ConfigNode& list, Scene& scene, ConfigProblems& problems
     const std::string path = fmt::format("walkers[{}]", i);
     std::vector<double> from, to;
 
+    // Settings of one walker.
     Walker walker;
     walker.mark = node.mark;
     core::OptionTable table;
@@ -124,6 +130,7 @@ void read_walkers(const ConfigNode& list, Scene& scene, ConfigProblems& problems
     table.number("speed", walker.speed, {0.02, 5.0}, "m/s", "Speed");
     table.choice("material", walker.material, material_names(), "Material of the clothes");
 
+    // A walk needs two places.
     const std::size_t before = problems.size();
     table.set_all(node, path, problems);
     if (problems.size() != before) continue;
@@ -150,6 +157,7 @@ void read_root(const ConfigNode& root, Scene& scene, ConfigProblems& problems) {
   table.set_all(root, "", problems, {"objects", "robots", "walkers"});
   scene.motion = motion == "wheeled" ? Motion::kWheeled : Motion::kHandheld;
 
+  // Errors in events are reported at their line.
   if (auto parsed = parse_events(events)) {
     scene.events = *parsed;
   } else {
@@ -157,6 +165,7 @@ void read_root(const ConfigNode& root, Scene& scene, ConfigProblems& problems) {
     problems.push_back({node != nullptr ? node->mark : root.mark, "events", parsed.error().message});
   }
 
+  // Things, in the order of the file.
   Builder builder(scene);
   if (const ConfigNode* objects = root.find("objects")) {
     read_objects(*objects, builder, problems);
@@ -164,6 +173,7 @@ void read_root(const ConfigNode& root, Scene& scene, ConfigProblems& problems) {
     problems.push_back({root.mark, "objects", "a scene needs a list of objects"});
   }
 
+  // Robots and people, after the things around them.
   read_robots(root, scene, problems);
   if (const ConfigNode* walkers = root.find("walkers")) read_walkers(*walkers, scene, problems);
   if (problems.empty() && scene.faces.empty())

@@ -12,11 +12,13 @@ core::Result<void> read_settings(const std::string& option, const std::string& t
   core::OptionTable table;
   for (const Setting& s : settings) table.number(s.key, *s.value, s.range, s.unit, "");
 
+  // The text becomes a map of keys.
   core::ConfigNode map;
   map.kind = core::ConfigNode::Kind::kMap;
   std::istringstream pieces(text);
   std::string piece;
 
+  // One setting between commas.
   while (std::getline(pieces, piece, ',')) {
     const auto trim = [](const std::string& s) {
       const auto first = s.find_first_not_of(' ');
@@ -41,6 +43,7 @@ core::Result<void> read_settings(const std::string& option, const std::string& t
     map.key_marks.emplace_back();
   }
 
+  // The table checks keys, units and ranges.
   core::ConfigProblems problems;
   table.set_all(map, option, problems);
   if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));

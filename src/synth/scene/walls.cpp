@@ -10,14 +10,20 @@ using geometry::Rigid3;
 
 namespace {
 
+/// A rectangle of a wall, m along it and above its foot.
+struct WallPiece {
+  double x0, x1, z0, z1;
+};
+
 /// One solid piece of a wall; texture coordinates count from the wall's foot, so pieces continue each other.
-void add_piece(Builder& b, const Rigid3& frame, const Wall& wall, double x0, double x1, double z0,
-               double z1) {
+void add_piece(Builder& b, const Rigid3& frame, const Wall& wall, const WallPiece& piece) {
+  const auto [x0, x1, z0, z1] = piece;
   if (x1 - x0 < 1e-6 || z1 - z0 < 1e-6) return;
   const double half = 0.5 * wall.thickness;
   const std::size_t first = b.scene().faces.size();
   b.box(frame, {x0, -half, z0}, {x1, half, z1}, {wall.material});
 
+  // Textures continue across openings.
   const double length = (wall.to - wall.from).norm();
   for (std::size_t i = first; i < b.scene().faces.size(); ++i) {
     Face& face = b.scene().faces[i];
@@ -26,6 +32,7 @@ void add_piece(Builder& b, const Rigid3& frame, const Wall& wall, double x0, dou
     Builder::anchor(face, foot);
   }
 
+  // Skirting only at the floor.
   if (!wall.skirting.empty() && z0 < 1e-6) {
     const double out = half + 0.012;
     b.box(frame, {x0, -out, z0}, {x1, out, z0 + 0.08}, {wall.skirting});
@@ -39,6 +46,8 @@ void add_frame(Builder& b, const Rigid3& frame, const Wall& wall, const Opening&
   b.box(frame, {x0 - bar, -half, z0}, {x0 + 0.01, half, z1 + bar}, {material});
   b.box(frame, {x1 - 0.01, -half, z0}, {x1 + bar, half, z1 + bar}, {material});
   b.box(frame, {x0, -half, z1 - 0.01}, {x1, half, z1 + bar}, {material});
+
+  // A sill that stands out.
   if (o.window)
     b.box(frame, {x0 - bar, -half - 0.08, z0 - 0.04}, {x1 + bar, half + 0.02, z0 + 0.01}, {material});
 }
@@ -51,6 +60,8 @@ void add_glass(Builder& b, const Rigid3& frame, const Opening& o) {
   b.box(frame, {x0, -0.01, z0}, {x1, 0.01, z1}, view, &view);
   const double xm = 0.5 * (x0 + x1);
   b.box(frame, {xm - 0.03, -0.03, z0}, {xm + 0.03, 0.03, z1}, {"paint_white"});
+
+  // Daylight, from slightly inside.
   Lamp lamp;
   lamp.center = frame * Vector3d(xm, -0.05, 0.5 * (z0 + z1));
   lamp.half_u = frame.rotation * Vector3d(0.5 * o.width, 0.0, 0.0);
@@ -68,6 +79,8 @@ void add_leaf(Builder& b, const Rigid3& frame, const Wall& wall, const Opening& 
   const Skin leaf{o.material, true};
   const std::size_t first = b.scene().faces.size();
   b.box(hinge, {0.0, 0.0, 0.01}, {w, 0.04, h}, leaf, &leaf);
+
+  // Handles on both sides.
   for (const double y : {-0.05, 0.04})
     b.box(hinge, {w - 0.14, y, 1.02}, {w - 0.03, y + 0.05, 1.05}, {"metal"});
   b.scene().leaves.push_back({first, b.scene().faces.size() - first, hinge.translation, o.open_rad});
@@ -76,15 +89,19 @@ void add_leaf(Builder& b, const Rigid3& frame, const Wall& wall, const Opening& 
 void add_wall(Builder& b, const Wall& wall) {
   const Eigen::Vector2d along = wall.to - wall.from;
   const Rigid3 frame = upright({wall.from.x(), wall.from.y(), wall.bottom}, std::atan2(along.y(), along.x()));
+
+  // Around the openings.
   double x = 0.0;
   for (const Opening& o : wall.openings) {
-    add_piece(b, frame, wall, x, o.at, 0.0, wall.height);
-    add_piece(b, frame, wall, o.at, o.at + o.width, 0.0, o.bottom);
-    add_piece(b, frame, wall, o.at, o.at + o.width, o.bottom + o.height, wall.height);
+    add_piece(b, frame, wall, {x, o.at, 0.0, wall.height});
+    add_piece(b, frame, wall, {o.at, o.at + o.width, 0.0, o.bottom});
+    add_piece(b, frame, wall, {o.at, o.at + o.width, o.bottom + o.height, wall.height});
     x = o.at + o.width;
   }
 
-  add_piece(b, frame, wall, x, along.norm(), 0.0, wall.height);
+  add_piece(b, frame, wall, {x, along.norm(), 0.0, wall.height});
+
+  // Frames, glass and leaves.
   for (const Opening& o : wall.openings) {
     add_frame(b, frame, wall, o, "paint_white");
     if (o.window) {
@@ -116,10 +133,14 @@ void add_zigzag_panel(Builder& b, const Wall& wall, const std::vector<Eigen::Vec
   const double z0 = wall.bottom, z1 = wall.bottom + wall.height;
   const Vector3d u = lift(c - a, 0.0);
   const Skin skin{wall.material};
+
+  // Both sides, top and bottom.
   b.polygon({lift(a - ma, z0), lift(c - mc, z0), lift(c - mc, z1), lift(a - ma, z1)}, u, skin);
   b.polygon({lift(c + mc, z0), lift(a + ma, z0), lift(a + ma, z1), lift(c + mc, z1)}, -u, skin);
   b.polygon({lift(a - ma, z1), lift(c - mc, z1), lift(c + mc, z1), lift(a + ma, z1)}, u, skin);
   b.polygon({lift(a + ma, z0), lift(c + mc, z0), lift(c - mc, z0), lift(a - ma, z0)}, u, skin);
+
+  // Only ends of the whole row are visible.
   if (index == 0)
     b.polygon({lift(a + ma, z0), lift(a - ma, z0), lift(a - ma, z1), lift(a + ma, z1)}, lift(-ma, 0.0), skin);
   if (index + 2 == points.size()) {

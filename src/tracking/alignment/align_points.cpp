@@ -16,11 +16,17 @@ struct Sight {
   Eigen::Matrix2f frame_from_patch;  ///< distances of pixels of the full images
 };
 
+/// A camera at a guess of its pose.
+struct Place {
+  const sensor::Pinhole& camera;
+  const geometry::Rigid3& camera_from_world;
+  double log_scale;  ///< of one octave
+};
+
 /// None when the keyframe saw it from a direction or at a distance that is too different.
 std::optional<Sight> sight_of(const maps::Map& map, const maps::Observation& seen,
                               const Eigen::Vector3d& position, const Eigen::Vector3d& normal,
-                              const sensor::Pinhole& camera, const geometry::Rigid3& camera_from_world,
-                              double log_scale) {
+                              const Place& place) {
   constexpr double kLeastCosine = 0.9;
   constexpr double kMostOblique = 0.15;  // cosine: normals are not known well enough
   constexpr double kMostOctaves = 3.5;
@@ -30,16 +36,16 @@ std::optional<Sight> sight_of(const maps::Map& map, const maps::Observation& see
   if (keyframe.features == nullptr || feature >= keyframe.features->patches.size()) return std::nullopt;
 
   const geometry::Rigid3& there_from_world = map.camera_from_world(seen.keyframe);
-  const Eigen::Vector3d here = camera_from_world * position;
+  const Eigen::Vector3d here = place.camera_from_world * position;
   const Eigen::Vector3d there = there_from_world * position;
   if (there.z() < kNearest_m) return std::nullopt;
 
-  const geometry::Rigid3 here_from_there = camera_from_world * there_from_world.inverse();
+  const geometry::Rigid3 here_from_there = place.camera_from_world * there_from_world.inverse();
   if ((here_from_there.rotation * there).dot(here) < kLeastCosine * there.norm() * here.norm())
     return std::nullopt;
 
   Sight sight;
-  sight.farther = std::log(here.norm() / there.norm()) / log_scale;
+  sight.farther = std::log(here.norm() / there.norm()) / place.log_scale;
   if (std::abs(sight.farther) > kMostOctaves) return std::nullopt;
 
   // Its surface there, or a plane across the line of sight, seen from here: one pixel each way.
@@ -47,12 +53,14 @@ std::optional<Sight> sight_of(const maps::Map& map, const maps::Observation& see
 
   const bool slanted = -facing.dot(there) > kMostOblique * there.norm();
   const Eigen::Vector3d across = slanted ? facing : there;
+  const sensor::Pinhole& camera = place.camera;
   const Eigen::Vector2d at = camera.project(there);
   const auto carried = [&](double du, double dv) {
     const Eigen::Vector3d ray = camera.unproject(at.x() + du, at.y() + dv, 1.0);
     return Eigen::Vector2d(camera.project(here_from_there * (ray * (across.dot(there) / across.dot(ray)))));
   };
 
+  // Central differences of the mapping from patch to frame
   sight.frame_from_patch.col(0) = (0.5 * (carried(1.0, 0.0) - carried(-1.0, 0.0))).cast<float>();
   sight.frame_from_patch.col(1) = (0.5 * (carried(0.0, 1.0) - carried(0.0, -1.0))).cast<float>();
   sight.patch = &keyframe.features->patches[feature];
@@ -61,13 +69,11 @@ std::optional<Sight> sight_of(const maps::Map& map, const maps::Observation& see
 }
 
 /// The first keyframe that saw the landmark from a direction and at a distance not too different: newer ones
-/// were aligned with older ones, and add up what each is off.
-std::optional<Sight> first_sight(const maps::Map& map, const maps::MapPoint& point,
-                                 const sensor::Pinhole& camera, const geometry::Rigid3& camera_from_world,
-                                 double log_scale) {
+/// were aligned with older ones and accumulate their errors.
+std::optional<Sight> first_sight(const maps::Map& map, const maps::MapPoint& point, const Place& place) {
   for (const maps::Observation& o : point.observations) {
     if (!o.aligned) continue;
-    const auto sight = sight_of(map, o, point.position, point.normal, camera, camera_from_world, log_scale);
+    const auto sight = sight_of(map, o, point.position, point.normal, place);
     if (sight) return sight->frame_from_patch.allFinite() ? sight : std::nullopt;
   }
   return std::nullopt;
@@ -101,9 +107,11 @@ void align_points(const maps::Map& map, const features::FrameFeatures& frame, co
     m.shift.setZero();
   }
   if (frame.levels.empty() || frame.patches.size() != frame.points.size()) return;
-  const double log_scale = std::log(scale_factor);
+  const Place place{camera, camera_from_world, std::log(scale_factor)};
+
+  // Shift of the corner against an earlier observation
   for (PointMatch& m : matches) {
-    const auto sight = first_sight(map, map.point(m.point), camera, camera_from_world, log_scale);
+    const auto sight = first_sight(map, map.point(m.point), place);
     if (!sight) continue;
     const Eigen::Vector2f& corner = frame.patches[static_cast<std::size_t>(m.feature)].middle;
     const auto found = align(*sight, frame.levels, corner, scale_factor);
@@ -114,16 +122,13 @@ void align_points(const maps::Map& map, const features::FrameFeatures& frame, co
 }
 
 std::optional<Eigen::Vector2f> align_observation(const maps::Map& map, const maps::Observation& seen,
-                                                 const Eigen::Vector3d& position,
-                                                 const std::vector<cv::Mat>& levels,
-                                                 const Eigen::Vector2f& start, const sensor::Pinhole& camera,
-                                                 const geometry::Rigid3& camera_from_world,
-                                                 double scale_factor) {
-  if (levels.empty()) return std::nullopt;
-  const auto sight = sight_of(map, seen, position, Eigen::Vector3d::Zero(), camera, camera_from_world,
-                              std::log(scale_factor));
+                                                 const Eigen::Vector3d& position, const PosedImage& image,
+                                                 const Eigen::Vector2f& start) {
+  if (image.levels.empty()) return std::nullopt;
+  const auto sight = sight_of(map, seen, position, Eigen::Vector3d::Zero(),
+                              {image.camera, image.camera_from_world, std::log(image.scale_factor)});
   if (!sight || !sight->frame_from_patch.allFinite() || sight->patch->empty()) return std::nullopt;
-  return align(*sight, levels, start, scale_factor);
+  return align(*sight, image.levels, start, image.scale_factor);
 }
 
 }  // namespace plumbline::tracking

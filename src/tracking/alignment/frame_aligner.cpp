@@ -40,11 +40,14 @@ FrameAligner::FrameAligner(const AlignmentInput& input, const Rigid3& hypothesis
 }
 
 TrackResult FrameAligner::run() {
+  // With a search radius: coarse rounds first
   if (search_radius_px_ > 0.0) {
     for (const AlignmentRound& round : kCoarse) align(round);
     correct_image_motion();
   }
   align_finely();
+
+  // Again without the prior, if measurements contradict it
   if (contradicts_motion_prior()) {
     use_motion_prior_ = false;
     align_finely();
@@ -61,6 +64,7 @@ void FrameAligner::align_finely() {
   align(kFine[2]);
 }
 
+// One round of association and optimisation.
 void FrameAligner::align(const AlignmentRound& round) {
   if (round.rematch) match_landmarks(round);  // points and lines, by projection: e_p and e_l of section 3.2
   associate_surface(round);                   // point to plane
@@ -78,6 +82,7 @@ bool FrameAligner::correct_image_motion() {
   const double delay_s = in_.depth_delay_s;
   if (readout_s == 0.0 && delay_s == 0.0) return false;
 
+  // Velocities that follow from the new pose
   const Rigid3& pose = result_.camera_from_world;
   const auto at_stamp = in_.motion.velocity_after(frame().stamp, pose, 0.0);
   const auto until_depth = in_.motion.velocity_after(frame().stamp, pose, delay_s);
@@ -90,6 +95,7 @@ bool FrameAligner::correct_image_motion() {
       (delay_s * *until_depth - geometry::log_se3(motion_.depth_from_camera)) / (1.0 + ahead);
   const ImageMotion motion{readout_s * *at_stamp, geometry::exp_se3(change) * motion_.depth_from_camera};
 
+  // Shift of features at a typical distance
   constexpr double kDistance_m = 1.5;  // of what is seen
   const geometry::Vector6d shutter_change = 0.5 * (motion.shutter - motion_.shutter);
   const double moved_px =
@@ -109,20 +115,24 @@ void FrameAligner::match_landmarks(const AlignmentRound& round) {
   const double radius = round.search_radius_px > 0.0 ? round.search_radius_px : search_radius_px_;
   const AssociationOptions& how = in_.options.association;
   const Rigid3& pose = result_.camera_from_world;
+
+  // Landmarks of the previous round are replaced
   result_.visible_points.clear();
   result_.visible_lines.clear();
   result_.doubtful.clear();
 
   if (in_.options.points) {
-    result_.points = match_points(in_.map, in_.local_map.points, features(), in_.camera, pose, radius, how,
+    result_.points = match_points(in_.map, in_.local_map.points, {features(), in_.camera, pose}, radius, how,
                                   &result_.visible_points);
+
+    // Corners are aligned once outliers are rejected
     if (how.align && round.reject_outliers)
       align_points(in_.map, features(), in_.camera, pose, how.scale_factor, result_.points);
     problem_.points = point_terms(in_.map, result_.points, features(), how);
   }
 
   if (in_.options.lines) {
-    result_.lines = match_lines(in_.map, in_.local_map.lines, features(), in_.camera, pose, radius, how,
+    result_.lines = match_lines(in_.map, in_.local_map.lines, {features(), in_.camera, pose}, radius, how,
                                 &result_.visible_lines);
     problem_.lines = line_terms(in_.map, result_.lines, features(), kLineSigma_px);
   }
@@ -130,16 +140,21 @@ void FrameAligner::match_landmarks(const AlignmentRound& round) {
 
 void FrameAligner::associate_surface(const AlignmentRound& round) {
   if (!in_.options.depth) return;
+
+  // Coarse rounds have wider gates
   SurfaceAssociationOptions how;
   how.max_distance_m = round.max_plane_distance_m;
   how.max_samples = round.surface_samples;
-  problem_.planes =
-      tracking::associate_surface(in_.local_map.surface, frame().depth, in_.camera, result_.camera_from_world,
-                                  motion_.depth_from_camera, how, &result_.surface_in_view);
+  problem_.planes = tracking::associate_surface(
+      in_.local_map.surface,
+      {frame().depth, in_.camera, result_.camera_from_world, motion_.depth_from_camera}, how,
+      &result_.surface_in_view);
 }
 
 void FrameAligner::associate_intensity(const AlignmentRound& round) {
   if (!in_.options.photometric || features().photometric == nullptr) return;
+
+  // Terms of the same pyramid level are only updated
   const bool again = intensity_level_ == round.pyramid_level && problem_.photometric &&
                      update_photometric(*problem_.photometric, result_.camera_from_world);
   if (!again) {
@@ -169,7 +184,7 @@ void FrameAligner::constrain_degenerate_directions() {
   if (!in_.options.motion_prior) return;
   MotionTrust trust = MotionTrust::kUnknown;
   if (use_motion_prior_ && surface_only_) trust = MotionTrust::kSurfaceOnly;
-  // Wheels slip: beside features they are worth less.
+  // Wheels slip: with features in view they count less.
   if (use_motion_prior_ && !surface_only_ && in_.motion.reliable(frame().stamp) && !in_.motion.knows_wheels())
     trust = MotionTrust::kLikely;
   problem_.prior = motion_prior(result_.estimate.information, predicted_, trust);
@@ -177,6 +192,8 @@ void FrameAligner::constrain_degenerate_directions() {
 
 void FrameAligner::reject_outliers() {
   const std::vector<double> errors = optimize::point_errors(problem_, result_.camera_from_world);
+
+  // Aligned points that do not fit are doubtful
   for (std::size_t i = 0; i < errors.size(); ++i) {
     if (errors[i] > kPointGate && result_.points[i].aligned) result_.doubtful.push_back(result_.points[i]);
   }

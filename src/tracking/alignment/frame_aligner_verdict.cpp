@@ -52,6 +52,7 @@ void FrameAligner::judge() {
   if (result_.surface_in_view > 0)
     result_.surface_share = static_cast<double>(estimate.planes.inliers) / result_.surface_in_view;
 
+  // Degenerate directions of the trusted information
   const bool by_features = feature_inliers() >= in_.options.min_inliers;
   const bool by_surface = estimate.planes.inliers >= in_.options.min_surface && result_.surface_share > 0.5;
   const geometry::Matrix6d information = trusted_information(by_features, by_surface);
@@ -74,6 +75,7 @@ void FrameAligner::judge() {
       result_.dead_reckoned ? projector_onto_degenerate(directions, limit)
                             : projector_onto_degenerate(principal_directions(estimate.information), kNoisy);
 
+  // Tracked if constrained, by measurements or dead reckoning
   const bool constrained = result_.dead_reckoned
                                ? in_.motion.may_dead_reckon() && ((by_features && many) || all_surface)
                                : by_features || by_surface;

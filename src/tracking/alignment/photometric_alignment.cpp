@@ -29,14 +29,16 @@ float median_size(const std::vector<float>& sizes) {
     return bits >> kMantissaShift;
   };
 
+  // Histogram of the leading bits
   std::array<std::uint32_t, 1U << (32 - kMantissaShift)> counts{};
   for (const float size : sizes) ++counts[bin_of(size)];
   std::size_t rank = sizes.size() / 2;
   std::uint32_t bin = 0;
   for (; rank >= counts[bin]; ++bin) rank -= counts[bin];
+
+  // Exact among the numbers of the median's bin
   std::vector<float> alike;
   alike.reserve(counts[bin]);
-
   for (const float size : sizes) {
     if (bin_of(size) == bin) alike.push_back(size);
   }
@@ -93,6 +95,7 @@ void PhotometricKeyframes::add(core::KeyframeId id,
 
 void PhotometricKeyframes::recalibrate(const sensor::Recalibration& change) {
   for (auto& [id, samples] : kept_) {
+    // Others may hold the samples: a copy is changed
     auto moved = std::make_shared<features::PhotometricSamples>(*samples);
     for (std::vector<features::PhotometricSample>& level : *moved) {
       for (features::PhotometricSample& s : level)
@@ -113,6 +116,8 @@ std::optional<optimize::PhotometricFamily> PhotometricKeyframes::associate(
     const maps::Map& map, const std::vector<core::KeyframeId>& keyframes, std::size_t level,
     const PhotometricView& view, const Rigid3& camera_from_world) const {
   if (view.image == nullptr) return std::nullopt;
+
+  // The first keyframe that shares enough of the image
   for (const core::KeyframeId id : keyframes) {
     const auto samples = find(id);
     if (samples == nullptr) continue;
@@ -143,6 +148,7 @@ std::optional<optimize::PhotometricFamily> photometric_in_view(const features::P
   family.camera = features::photometric_camera(view.camera, level);
   family.reference_from_world = reference_from_world;
 
+  // From the reference to this camera, in single precision
   const Rigid3 camera_from_reference = camera_from_world * reference_from_world.inverse();
   const Eigen::Matrix3f rotation = camera_from_reference.rotation.cast<float>();
   const Eigen::Vector3f translation = camera_from_reference.translation.cast<float>();
@@ -152,6 +158,7 @@ std::optional<optimize::PhotometricFamily> photometric_in_view(const features::P
   const bool with_depth = view.depth != nullptr && !view.depth->empty();
   family.terms.reserve(samples[level].size());
 
+  // Samples in view that no other surface hides
   for (const features::PhotometricSample& s : samples[level]) {
     const Eigen::Vector3f p = rotation * s.point + translation;
     if (!(p.z() > 0.1F)) continue;
@@ -162,6 +169,7 @@ std::optional<optimize::PhotometricFamily> photometric_in_view(const features::P
     term.point = s.point;
     term.value = s.value;
 
+    // Image gradient times the derivatives of the projection
     const float per_z = 1.0F / s.point.z();
     const Eigen::Vector3f by_point(
         s.gradient.x() * fx * per_z, s.gradient.y() * fy * per_z,
@@ -190,12 +198,14 @@ bool update_photometric(optimize::PhotometricFamily& family, const Rigid3& camer
     expected.push_back(std::abs(family.terms[i].value));
   }
 
+  // Gain between both images, by medians
   if (static_cast<int>(sizes.size()) < kMinPhotometric) return false;
   family.gain = std::clamp(
       static_cast<double>(median_size(sizes)) / std::max(static_cast<double>(median_size(expected)), 1e-3),
       1.0 / kLargestGain, kLargestGain);
   sizes.clear();
 
+  // Noise from the median absolute residual
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (!std::isnan(seen[i]))
       sizes.push_back(std::abs(seen[i] - static_cast<float>(family.gain) * family.terms[i].value));
@@ -209,10 +219,14 @@ bool update_photometric(optimize::PhotometricFamily& family, const Rigid3& camer
 ShiftedPose search_shift(const optimize::PhotometricFamily& family, const Rigid3& camera_from_world) {
   constexpr int kReach = 6;  // pixels
   const Rigid3 camera_from_reference = camera_from_world * family.reference_from_world.inverse();
+
+  // The mean distance converts pixels to metres
   double distance = 0.0;
   for (const optimize::PhotometricTerm& term : family.terms)
     distance += (camera_from_reference * term.point.cast<double>()).z();
   distance /= static_cast<double>(std::max<std::size_t>(1, family.terms.size()));
+
+  // The shift of the highest correlation
   ShiftedPose best;
   for (int dy = -kReach; dy <= kReach; ++dy) {
     for (int dx = -kReach; dx <= kReach; ++dx) {
@@ -234,6 +248,8 @@ std::size_t best_hypothesis(const std::vector<std::optional<double>>& agreement)
   std::size_t best = 0;
   for (std::size_t i = 1; i < agreement.size(); ++i) {
     if (!agreement[i]) continue;
+
+    // A later hypothesis must be clearly better
     const double least = agreement[best] ? *agreement[best] + kBetterAgreement : kGoodAgreement;
     if (*agreement[i] >= least) best = i;
   }

@@ -42,6 +42,8 @@ std::vector<optimize::LineTerm> line_terms(const maps::Map& map, const std::vect
   for (const LineMatch& match : matches) {
     const maps::MapLine& line = map.line(match.line);
     const features::LineSegment& s = features.lines[static_cast<std::size_t>(match.feature)].segment;
+
+    // An infinite line, since ends are not repeatable
     optimize::LineTerm term;
     term.world = geometry::line_through(line.start, line.end);
     term.start = s.start.cast<double>();

@@ -61,6 +61,7 @@ Step linearise(const std::vector<ThumbnailPixel>& pixels, const cv::Mat& current
     double dv = 0.0;
     if (!sample(current, uv.x(), uv.y(), value, du, dv)) continue;
 
+    // Residual and derivatives, with Huber's weight
     const double r = value - bias - static_cast<double>(pixel.value);
     const double weight = std::abs(r) <= loss ? 1.0 : loss / std::abs(r);
     const double iz = 1.0 / p.z();
@@ -70,6 +71,7 @@ Step linearise(const std::vector<ThumbnailPixel>& pixels, const cv::Mat& current
     j << dp, p.cross(dp), -1.0;
     alignas(32) const double row[8] = {j(0), j(1), j(2), j(3), j(4), j(5), j(6), 0.0};
 
+    // Lower triangle, in whole vectors
     for (int a = 0; a < 7; ++a) {
       const double wa = weight * row[a];
       for (int b = 0; b < (a < 4 ? 4 : 8); ++b) h[a][b] += wa * row[b];
@@ -91,6 +93,8 @@ std::vector<ThumbnailPixel> gather_pixels(const cv::Mat& image, const cv::Mat& d
                                           const sensor::Pinhole& camera) {
   std::vector<ThumbnailPixel> pixels;
   pixels.reserve(static_cast<std::size_t>(image.total()));
+
+  // Pixels with depth; those at the border lack gradients
   for (int y = 1; y + 1 < image.rows; ++y) {
     for (int x = 1; x + 1 < image.cols; ++x) {
       const float z = depth.at<float>(y, x);
@@ -129,6 +133,7 @@ ThumbnailAlignment align_thumbnails(const cv::Mat& previous, const cv::Mat& prev
     const Step step = linearise(pixels, current, small, pose, bias, kLoss);
     if (step.count < 200) break;
 
+    // The best pose so far is the result
     const double rms = std::sqrt(step.squares / step.count);
     if (i == 0) result.initial_rms = rms;
     if (best < 0.0 || rms < best) {
@@ -138,6 +143,7 @@ ThumbnailAlignment align_thumbnails(const cv::Mat& previous, const cv::Mat& prev
       result.pixels = step.count;
     }
 
+    // Step with the prior around the guess
     Matrix7d h = step.h;
     h.diagonal() += belief + Vector7d::Constant(1e-6);
     Vector7d g = step.g;

@@ -61,7 +61,7 @@ std::vector<std::uint8_t> everywhere(const std::vector<Vector3f>& points) {
 Comparison compared(const Surface& before, const Surface& after, const LookedThrough& through = everywhere,
                     int threads = 1) {
   const core::Executor executor(threads);
-  return find_changes(before, after, through, through, Vector3d::UnitZ(), {}, executor);
+  return find_changes({before, after}, through, through, Vector3d::UnitZ(), {}, executor);
 }
 
 TEST(Changes, UnchangedRoomHasNoneAndItsLimitsHold) {

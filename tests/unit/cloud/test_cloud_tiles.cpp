@@ -40,7 +40,7 @@ class Tiles : public testing::Test {
   [[nodiscard]] fs::path path(const std::string& name) const { return folder_ / name; }
   core::Result<TiledReport> tile(const FilterChain& chain, const std::string& input, double tile_m) const {
     CloudFrame frame;
-    return filter_in_tiles(chain, {path(input)}, path("tiled.ply"), tile_m, frame, nullptr, {});
+    return filter_in_tiles(chain, {{path(input)}, path("tiled.ply")}, tile_m, frame, nullptr, {});
   }
   /// Rows of a file, sorted, each as text.
   [[nodiscard]] std::vector<std::string> rows(const std::string& name) const {

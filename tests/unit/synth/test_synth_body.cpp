@@ -115,7 +115,7 @@ TEST(SynthBody, McapHasThePicturesAndWhatTheBodyMeasured) {
   const auto scene = load_scene("structure", kBodyScenes);
   const core::Executor executor(2);
   const auto log = core::null_log();
-  const auto written = write_recordings(*scene, options, folder, executor, {}, *log, {});
+  const auto written = write_recordings({*scene, options, folder}, executor, {}, *log, {});
   ASSERT_TRUE(written) << written.error().message;
   EXPECT_EQ(written->frames, 12U);
 

@@ -130,7 +130,7 @@ TEST(SynthCameraError, FolderHasBothFilesAndReadsLikeTheAddress) {
   const core::Executor executor(1);
   const auto log = core::null_log();
   const auto written =
-      write_recordings(*load_scene("structure", kErrorScenes), options, folder, executor, {}, *log, {});
+      write_recordings({*load_scene("structure", kErrorScenes), options, folder}, executor, {}, *log, {});
   ASSERT_TRUE(written) << written.error().message;
 
   const auto truth = sensor::read_camera(folder / "robot0" / "camera.true.yaml");

@@ -260,7 +260,7 @@ TEST(SynthLayoutNumbers, PlanFileHasTheTruth) {
   options.reference_spacing = 0.1;
   const auto folder = std::filesystem::path(testing::TempDir()) / "synth_plan";
   std::filesystem::remove_all(folder);
-  ASSERT_TRUE(write_recordings(*scene, options, folder, core::Executor(1), {}, log, {}));
+  ASSERT_TRUE(write_recordings({*scene, options, folder}, core::Executor(1), {}, log, {}));
 
   const auto plan = nlohmann::json::parse(std::ifstream(folder / "plan.json"));
   ASSERT_EQ(plan["rooms"].size(), scene->plan->rooms.size());

@@ -37,7 +37,7 @@ class SynthRecording : public ::testing::Test {
     if (!scene) throw std::runtime_error(scene.error().message);
     const core::Executor executor(threads);
     const auto log = core::null_log();
-    return write_recordings(*scene, options_, to, executor, stop, *log,
+    return write_recordings({*scene, options_, to}, executor, stop, *log,
                             [this](std::size_t done, std::size_t) { told_ = done; });
   }
   static std::string bytes(const fs::path& file) {
@@ -181,7 +181,7 @@ TEST_F(SynthRecording, RoundsThatRepeatAreTheFirstOneLater) {
   // Files of later rounds are those of the first.
   const auto log = core::null_log();
   options_.moving_masks = true;
-  const auto summary = write_recordings(*scene, options_, folder_, executor, {}, *log, {});
+  const auto summary = write_recordings({*scene, options_, folder_}, executor, {}, *log, {});
   ASSERT_TRUE(summary) << summary.error().message;
   EXPECT_EQ(summary->frames, 3 * round);
   std::size_t pictures = 0;

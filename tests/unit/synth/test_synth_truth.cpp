@@ -66,7 +66,7 @@ TEST(SynthTruth, RowsHaveMotionMoversAndEvents) {
   const auto log = core::null_log();
   const auto scene = parse_scene(kTruthCell, "test.yaml");
   ASSERT_TRUE(scene) << scene.error().message;
-  const auto written = write_recordings(*scene, options, folder, executor, {}, *log, {});
+  const auto written = write_recordings({*scene, options, folder}, executor, {}, *log, {});
   ASSERT_TRUE(written) << written.error().message;
 
   const auto rows = table_of(folder / "robot0" / "truth.csv");

@@ -112,7 +112,7 @@ TEST(Walker, IsNoPartOfTheReference) {
     const auto folder = std::filesystem::path(testing::TempDir()) / ("walker" + std::to_string(walkers));
     SynthOptions options = small(walkers, 3);
     options.reference_spacing = 0.05;
-    ASSERT_TRUE(write_recordings(*scene, options, folder, executor, stop, *log, {}));
+    ASSERT_TRUE(write_recordings({*scene, options, folder}, executor, stop, *log, {}));
     std::ostringstream text;
     text << std::ifstream(folder / "reference.ply", std::ios::binary).rdbuf();
     references.push_back(text.str());

@@ -44,7 +44,7 @@ class PointWorld : public testing::Test {
   std::vector<PointMatch> match(const Rigid3& pose = {}, double radius = 8.0,
                                 std::vector<core::PointId>* visible = nullptr) {
     frame_.grid = features::PointGrid(frame_.points, kTestCamera.width, kTestCamera.height);
-    return match_points(map_, ids_, frame_, kTestCamera, pose, radius, options_, visible);
+    return match_points(map_, ids_, {frame_, kTestCamera, pose}, radius, options_, visible);
   }
 
   maps::Map map_;
@@ -178,7 +178,7 @@ class LineWorld : public testing::Test {
     return static_cast<int>(frame_.lines.size()) - 1;
   }
   std::vector<LineMatch> match(double radius = 8.0, std::vector<core::LineId>* visible = nullptr) {
-    return match_lines(map_, ids_, frame_, kTestCamera, {}, radius, options_, visible);
+    return match_lines(map_, ids_, {frame_, kTestCamera, {}}, radius, options_, visible);
   }
 
   maps::Map map_;

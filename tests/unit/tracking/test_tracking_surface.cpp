@@ -179,7 +179,7 @@ TEST(AssociateSurface, IsExactAtTheTruePose) {
   for (int i = 0; i < 5; ++i) {
     const Rigid3 pose = random.step(0.2, 0.15);
     const auto surface = wall_samples();
-    const auto terms = associate_surface(surface, render_depth(kWall, pose), kTestCamera, pose, {}, {});
+    const auto terms = associate_surface(surface, {render_depth(kWall, pose), kTestCamera, pose, {}}, {});
     ASSERT_GT(terms.size(), surface.size() * 8 / 10);
     for (const optimize::PlaneTerm& term : terms) {
       EXPECT_NEAR(optimize::plane_residual(term, pose, nullptr) * term.sigma, 0.0, 1e-4);
@@ -192,7 +192,7 @@ TEST(AssociateSurface, ResidualsTellHowFarThePoseIsOff) {
   const cv::Mat depth = render_depth(kWall, {});
   const Rigid3 guess(Eigen::Matrix3d::Identity(),
                      {0.0, 0.0, -0.03});  // believes to be 3 cm nearer to the wall
-  const auto terms = associate_surface(wall_samples(), depth, kTestCamera, guess, {}, {});
+  const auto terms = associate_surface(wall_samples(), {depth, kTestCamera, guess, {}}, {});
   ASSERT_GT(terms.size(), 150U);
   for (const auto& term : terms) {
     EXPECT_NEAR(std::abs(optimize::plane_residual(term, guess, nullptr)) * term.sigma, 0.03, 1e-4);
@@ -205,11 +205,11 @@ TEST(AssociateSurface, DepthStampedApartIsBroughtBack) {
   const Rigid3 depth_from_camera(geometry::exp_so3({0.0, 0.03, 0.01}), {0.02, 0.01, 0.03});
   const cv::Mat depth = render_depth(kWall, depth_from_camera * pose);
   for (const auto& term :
-       associate_surface(wall_samples(), depth, kTestCamera, pose, depth_from_camera, {})) {
+       associate_surface(wall_samples(), {depth, kTestCamera, pose, depth_from_camera}, {})) {
     EXPECT_NEAR(optimize::plane_residual(term, pose, nullptr) * term.sigma, 0.0, 2e-4);
   }
   double worst = 0.0;
-  for (const auto& term : associate_surface(wall_samples(), depth, kTestCamera, pose, {}, {})) {
+  for (const auto& term : associate_surface(wall_samples(), {depth, kTestCamera, pose, {}}, {})) {
     worst = std::max(worst, std::abs(optimize::plane_residual(term, pose, nullptr)) * term.sigma);
   }
   EXPECT_GT(worst, 0.02) << "without it the difference shows";
@@ -219,7 +219,7 @@ TEST(AssociateSurface, Gates) {
   const cv::Mat depth = render_depth(kWall, {});
   SurfaceAssociationOptions options;
   const auto count = [&](const WorldSurface& s, const cv::Mat& d) {
-    return associate_surface({s}, d, kTestCamera, {}, {}, options).size();
+    return associate_surface({s}, {d, kTestCamera, {}, {}}, options).size();
   };
   const WorldSurface good{{0.1, 0.1, 2.0}, {0.0, 0.0, -1.0}, 0.005};
   EXPECT_EQ(count(good, depth), 1U);
@@ -236,9 +236,9 @@ TEST(AssociateSurface, Gates) {
   EXPECT_EQ(count(good, depth), 0U) << "too deep";
   options = {};
   options.max_samples = 50;
-  EXPECT_LE(associate_surface(wall_samples(), depth, kTestCamera, {}, {}, options).size(), 50U);
-  EXPECT_GT(associate_surface(wall_samples(), depth, kTestCamera, {}, {}, options).size(), 30U);
-  EXPECT_TRUE(associate_surface({}, depth, kTestCamera, {}, {}, options).empty());
+  EXPECT_LE(associate_surface(wall_samples(), {depth, kTestCamera, {}, {}}, options).size(), 50U);
+  EXPECT_GT(associate_surface(wall_samples(), {depth, kTestCamera, {}, {}}, options).size(), 30U);
+  EXPECT_TRUE(associate_surface({}, {depth, kTestCamera, {}, {}}, options).empty());
 }
 
 TEST(AssociateSurface, TakesNothingOverADepthJump) {
@@ -247,7 +247,7 @@ TEST(AssociateSurface, TakesNothingOverADepthJump) {
   const cv::Mat depth = render_depth(step, {});
   std::vector<WorldSurface> across;
   for (int i = -20; i <= 20; ++i) across.push_back({{1e-4 * i, 0.0, 2.0}, {0.0, 0.0, -1.0}, 0.005});
-  for (const auto& term : associate_surface(across, depth, kTestCamera, {}, {}, {})) {
+  for (const auto& term : associate_surface(across, {depth, kTestCamera, {}, {}}, {})) {
     EXPECT_TRUE(std::abs(term.camera.z() - 2.0) < 1e-4 || std::abs(term.camera.z() - 1.95) < 1e-4)
         << term.camera.z();
   }

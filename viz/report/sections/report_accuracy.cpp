@@ -27,16 +27,19 @@ Truths truths_of(const fs::path& truth, const ReportData& data) {
   Truths truths;
   const fs::path file = fs::is_directory(truth, ec) ? truth / "groundtruth.txt" : truth;
   if (fs::is_regular_file(file, ec)) {
+    // One file for all robots.
     for (std::size_t i = 0; i < data.paths.size(); ++i) truths.emplace_back(i, file);
     return truths;
   }
 
+  // Else as the evaluation finds them.
   for (const auto& pair : evaluate::find_trajectories(data.folder / "map.ply", truth / "reference.ply")) {
     for (std::size_t i = 0; i < data.paths.size(); ++i) {
       if (pair.robot == data.paths[i].robot || pair.robot.empty()) truths.emplace_back(i, pair.truth);
     }
   }
 
+  // Else by the robots' names.
   for (std::size_t i = 0; i < data.paths.size() && truths.empty();
        ++i) {  // one robot's map, of several recordings
     const fs::path own = truth / data.paths[i].robot / "groundtruth.txt";
@@ -77,6 +80,7 @@ std::string relative(const evaluate::RelativeError& e) {
                      number_text(e.rotation_deg.rmse, 3, "deg"));
 }
 
+/// Accuracy of each robot, and of all with one alignment.
 std::string errors_table(const ReportData& data) {
   RobotTable table;
   for (const ReportPath& path : data.paths) {
@@ -95,6 +99,7 @@ std::string errors_table(const ReportData& data) {
     table.value("Path, true", number_text(r.path_m, 2, "m"));
   }
 
+  // Together, errors between robots count too.
   if (data.joint_m) {
     table.robot("all, one alignment");
     table.value("ATE, rmse", distances(*data.joint_m));
@@ -113,6 +118,8 @@ std::string error_chart(const ReportData& data) {
     if (!path.accuracy) continue;
     viz::SvgLine line{
         path.robot.empty() ? "distance to the truth" : path.robot, robot_kind(path.number), {}, {}};
+
+    // Millimetres, from the first frame on.
     for (const evaluate::PoseError& pose : path.accuracy->poses) {
       line.x.push_back(pose.stamp - data.start_s);
       line.y.push_back(1e3 * pose.distance_m);
@@ -135,9 +142,9 @@ std::string saved_html(const ReportData& data) {
     const std::string name = it->path().filename().string();
     if (name.rfind("evaluation", 0) == 0 && it->path().extension() == ".json") names.push_back(name);
   }
-
   std::sort(names.begin(), names.end());
 
+  // Columns and where their values are in the files.
   JsonTable paths({{"evaluation of a path", ""},
                    {">ATE rmse (mm)", "{/ate_m/rmse:1mm}"},
                    {">median (mm)", "{/ate_m/median:1mm}"},
@@ -147,6 +154,7 @@ std::string saved_html(const ReportData& data) {
                    {">RPE per second (mm)", "{/rpe/per_second/translation_m/rmse:1mm}"},
                    {">tracked (%)", "{/tracked_percent:1}"}});
 
+  // Columns of cloud evaluations.
   JsonTable clouds({{"evaluation of a cloud", ""},
                     {">accuracy median (mm)", "{/accuracy_mm/median:1}"},
                     {">rmse (mm)", "{/accuracy_mm/rmse:1}"},
@@ -157,6 +165,7 @@ std::string saved_html(const ReportData& data) {
 
   std::string out;
 
+  // The keys show which evaluation it was.
   for (const std::string& name : names) {
     const Json json = core::read_json(data.folder / name).value_or(Json());
 
@@ -194,27 +203,32 @@ core::Result<void> add_truth(const fs::path& truth, ReportData& data) {
     auto poses = dataset::read_trajectory(file);
     if (!poses) return tl::unexpected<core::Error>(poses.error());
 
+    // Errors after rigid alignment.
     auto report = evaluate::evaluate_trajectory(path.poses, *poses);
     if (!report) {
       return core::input_error(fmt::format("--truth {}: {}", file.string(), report.error().message));
     }
 
+    // Kept for the joint alignment.
     path.accuracy = std::move(*report);
     name_truth(path.robot, file, data);
     pairs.emplace_back(path.poses, std::move(*poses));
   }
 
+  // The message names all files tried.
   if (pairs.empty()) {
     std::string looked_for = (truth / "groundtruth.txt").string();
     for (const ReportPath& path : data.paths) {
       if (!path.robot.empty()) looked_for += ", " + (truth / path.robot / "groundtruth.txt").string();
     }
+
     return core::input_error(
         fmt::format("--truth {}: there is no groundtruth.txt that fits; looked for {}; name a recording with "
                     "truth, a folder with one for each robot, named like it, or a file in TUM format",
                     truth.string(), looked_for));
   }
 
+  // One alignment of all robots.
   if (pairs.size() > 1) data.joint_m = joint_error(pairs);
   return {};
 }
@@ -225,12 +239,16 @@ std::string accuracy_html(const ReportData& data) {
   std::string out;
   if (measured) {
     out += paragraph("Compared with " + data.truth + ".") + errors_table(data) + error_chart(data);
+
+    // Warnings of the evaluation.
     for (const ReportPath& path : data.paths) {
       if (!path.accuracy) continue;
       for (const std::string& warning : path.accuracy->warnings) {
         out += note((path.robot.empty() ? "" : path.robot + ": ") + warning + ".");
       }
     }
+
+    // Terms of the table.
     out += note(
         "ATE: distance of the positions after rigid alignment (Horn 1987). RPE: error of the motion over a "
         "frame and over a second, rmse. The truth is good to what it was measured with.");

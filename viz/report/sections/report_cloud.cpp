@@ -106,15 +106,19 @@ std::optional<CloudExtent> measure_extent(const cloud::Cloud& cloud) {
     values[2].push_back(p.z);
   }
 
+  // Number of outer points on each side.
   const std::size_t count = values[0].size();
   if (count == 0) return std::nullopt;
   CloudExtent extent;
   const auto outer = static_cast<std::ptrdiff_t>(kOuter * static_cast<double>(count));
 
+  // Bounds of each axis.
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<float>& v = values[static_cast<std::size_t>(axis)];
     const auto [low, high] = std::minmax_element(v.begin(), v.end());
     extent.low[axis] = *low;
+
+    // Bounds without outliers.
     extent.high[axis] = *high;
     std::nth_element(v.begin(), v.begin() + outer, v.end());
     extent.central_low[axis] = v[static_cast<std::size_t>(outer)];
@@ -131,12 +135,15 @@ std::optional<viz::SvgBackground> plan_of(const ReportData& data) {
   if (!data.extent) return std::nullopt;
   const auto [low, high] = shown(*data.extent);
   const auto [across, up] = plan_axes(data);
+
+  // Cells no finer than pixels and voxels.
   const double longest = std::max(high[across] - low[across], high[up] - low[up]);
   const double cell_m =
       std::max({longest / kPlanPixels, 1.5 * number_at(data.summary, "/cloud/voxel_m"), 1e-3});
   const cv::Mat counts = counted(data, low, high, cell_m);
   const double most = std::log1p(darkest(counts));
 
+  // Opacity by the logarithm of the count.
   cv::Mat picture(counts.size(), CV_8UC4);
   for (int row = 0; row < counts.rows; ++row) {
     for (int column = 0; column < counts.cols; ++column) {
@@ -149,6 +156,7 @@ std::optional<viz::SvgBackground> plan_of(const ReportData& data) {
   const auto png = dataset::encode_png(picture, kSmall);
   if (!png) return std::nullopt;
 
+  // The image becomes part of the page.
   viz::SvgBackground plan;
   plan.data_uri =
       "data:image/png;base64," + base64({reinterpret_cast<const char*>(png->data()), png->size()});
@@ -165,6 +173,7 @@ std::string cloud_html(const ReportData& data) {
   add_left_out(data, "/cloud/left_out", "Left out of what keyframes measured, points", facts);
   add_left_out(data, "/cloud/left_out_of_map", "Left out of the merged cloud, points", facts);
 
+  // Sizes, with and without outliers.
   std::string out;
   if (const std::optional<CloudExtent>& extent = data.extent) {
     facts.emplace_back("File", data.cloud_file);
@@ -172,6 +181,7 @@ std::string cloud_html(const ReportData& data) {
     facts.emplace_back("Bounding box without the outer 0.5 % of each side", box_text(extent->central_size()));
     facts.emplace_back("Coordinates", range_text(extent->low, extent->high));
 
+    // Uncertainty, if the cloud has it.
     if (number_at(data.summary, "/cloud/sigma_m/median") > 0.0) {
       facts.emplace_back("Standard deviation along the normal, of poses and depth",
                          filled(data.summary,
@@ -180,6 +190,8 @@ std::string cloud_html(const ReportData& data) {
     }
 
     add_robots(data, facts);
+
+    // The file may have been changed since.
     const double counted = number_at(data.summary, "/cloud/points");
     const auto found = static_cast<double>(data.cloud->cloud->size());
     if (counted != found) {

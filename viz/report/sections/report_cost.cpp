@@ -35,15 +35,19 @@ std::vector<TimedColumn> slowest_stages(const CsvTable& table) {
   std::vector<TimedColumn> columns;
   for (std::size_t c = 0; c < table.columns().size(); ++c) {
     const std::string& name = table.columns()[c];
+
+    // Whole stages, not their parts.
     const bool stage =
         name.size() > 3 && name.substr(name.size() - 3) == "_ms" && name.find('.') == std::string::npos;
     if (!stage) continue;
 
+    // Only stages that take noticeable time.
     TimedColumn column{name.substr(0, name.size() - 3), values_of(table, c), 0.0};
     column.median = core::quantile(column.values, 0.5);
     if (core::quantile(column.values, 0.95) >= kWorthShowing_ms) columns.push_back(std::move(column));
   }
 
+  // The slowest ones first.
   const auto slower = [](const TimedColumn& a, const TimedColumn& b) { return a.median > b.median; };
   std::stable_sort(columns.begin(), columns.end(), slower);
   if (columns.size() > kMost) columns.resize(kMost);
@@ -57,11 +61,13 @@ std::string time_charts(const ReportData& data) {
   const double start_s = core::quantile(time_s, 0.0);
   for (double& t : time_s) t -= start_s;
 
+  // One curve per stage.
   viz::SvgChart chart;
   chart.title = "Milliseconds of each stage per frame";
   chart.y_label = "a frame (ms)";
   chart.height_px = 180;
 
+  // Quantiles, to notice rare peaks.
   double usual = 0.0, most = 0.0;
   for (TimedColumn& column : slowest_stages(table)) {
     usual = std::max(usual, core::quantile(column.values, 0.98));
@@ -69,12 +75,14 @@ std::string time_charts(const ReportData& data) {
     chart.lines.push_back({column.name, robot_kind(chart.lines.size()), time_s, std::move(column.values)});
   }
 
+  // Peaks must not flatten the rest.
   std::string out;
   if (most > 3.0 * usual) chart.y_range = viz::AxisRange{0.0, 2.0 * usual};
   if (!chart.lines.empty()) out += svg_chart(chart);
   if (chart.y_range)
     out += note(fmt::format("Peaks are cut off; the highest is {}.", number_text(most, 0, "ms")));
 
+  // Memory, if it was measured.
   viz::SvgChart memory;
   memory.title = "Memory over time";
   memory.x_label = "time (s)";
@@ -92,6 +100,8 @@ std::string stages_table(const Json& summary) {
                    {">at the end (ms)", "{/finish:0}"},
                    {">times", ""}});
   for (const auto& [name, stage] : list_at(summary, "/timing/stages_ms").items()) table.row(stage, {name});
+
+  // Parts of stages, in grey.
   for (const auto& [name, part] : list_at(summary, "/timing/parts_ms").items()) {
     table.row(part,
               {name, filled(part, "{/median:2}"), filled(part, "{/p95:2}"), "", filled(part, "{/times}")},
@@ -124,6 +134,7 @@ std::string what_is(const std::string& name) {
        {".ply", "cloud"},
        {".pcd", "cloud"}}};
 
+  // The first that fits: names precede endings.
   for (const Known& known : kKnown) {
     const std::string end = known.name;
     if (name.size() >= end.size() && name.compare(name.size() - end.size(), end.size(), end) == 0)
@@ -146,11 +157,14 @@ std::string cost_html(const ReportData& data) {
     facts.emplace_back(label, filled(s, pattern));
   };
 
+  // Only some runs have a pace or a live source.
   if (number_at(s, "/timing/pace_hz") > 0.0)
     add("Played at", "{/timing/pace_hz:1} a second; {/timing/behind_s:2 s} behind at most");
   if (number_at(s, "/live/kept_frames") > 0.0)
     add("Pictures kept",
         "{/live/kept_frames}, packed {/live/kept_bytes} bytes, to be read with another camera");
+
+  // Known of every run.
   add("Threads", "{/timing/threads}");
   add("Memory at most", "{/memory/peak_rss_mb:0 MB}");
   if (number_at(s, "/frames/resumed") > 0.0) {
@@ -172,16 +186,20 @@ std::string files_html(const ReportData& data, const fs::path& left_out) {
   std::vector<std::pair<std::string, double>> files;
   double all = 0.0;
 
+  // All files of the result, with their sizes.
   std::error_code ec;
   for (fs::recursive_directory_iterator it(data.folder, ec), end; !ec && it != end; it.increment(ec)) {
     std::error_code problem;
     const std::string name = it->path().lexically_relative(data.folder).generic_string();
+
+    // Neither hidden files nor this report.
     const bool hidden = it->path().filename().string().front() == '.' || name == "report.html";
     if (hidden || !it->is_regular_file(problem) || fs::equivalent(it->path(), left_out, problem)) continue;
     files.emplace_back(name, static_cast<double>(it->file_size(problem)));
     all += files.back().second;
   }
 
+  // In order of names, up to a limit.
   std::sort(files.begin(), files.end());
   HtmlTable table("file|>size|>bytes|what it is");
   for (std::size_t i = 0; i < std::min(kMost, files.size()); ++i) {

@@ -59,6 +59,7 @@ std::string exports_html(const ReportData& data) {
   std::sort(files.begin(), files.end());
   if (files.empty()) return {};
 
+  // A link for each file.
   std::string pictures;
   std::string links;
   for (const fs::path& file : files) {
@@ -66,6 +67,7 @@ std::string exports_html(const ReportData& data) {
     links += fmt::format("<li><a href=\"{0}\">{0}</a>: {1}</li>\n", name, viz::markup_text(form_of(file)));
     if (file.extension() != ".svg") continue;
 
+    // Vector drawings are shown in the page.
     const std::string bytes = read_bytes(file);
     if (bytes.find("</svg>") == std::string::npos) continue;  // not whole
     pictures += fmt::format(

@@ -25,11 +25,13 @@ MapFit fit_of(const maps::Map& map, const sensor::Pinhole& camera,
     return own == cameras.end() ? camera : own->second;
   };
 
+  // Points that several keyframes observed.
   std::vector<double> points, depths, lines;
   for (const core::PointId id : map.point_ids()) {
     const maps::MapPoint& point = map.point(id);
     if (point.observations.size() < 2) continue;  // fits its only observation exactly
 
+    // Residuals of the adjustment, without weights.
     for (const maps::Observation& o : point.observations) {
       const auto& corner = map.keyframe(o.keyframe).features->points[static_cast<std::size_t>(o.feature)];
       optimize::PointTerm term;  // sigmas of 1: residuals in pixels and metres
@@ -49,6 +51,7 @@ MapFit fit_of(const maps::Map& map, const sensor::Pinhole& camera,
     const maps::MapLine& line = map.line(id);
     if (line.observations.size() < 2) continue;
 
+    // Lines in the same way.
     for (const maps::Observation& o : line.observations) {
       const auto& segment =
           map.keyframe(o.keyframe).features->lines[static_cast<std::size_t>(o.feature)].segment;
@@ -58,6 +61,7 @@ MapFit fit_of(const maps::Map& map, const sensor::Pinhole& camera,
       term.start = segment.start.cast<double>();
       term.end = segment.end.cast<double>();
 
+      // Distances of both ends from the line.
       Eigen::Vector2d r;
       const auto projection = geometry::line_projection(c.fx, c.fy, c.cx, c.cy);
       if (!optimize::line_residual(term, map.camera_from_world(o.keyframe), projection, r, nullptr)) continue;

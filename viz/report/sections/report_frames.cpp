@@ -40,6 +40,7 @@ void sort_by_robot(ReportData& data) {
   const std::size_t robot_column = table.column("robot");
   const bool several = robot_column < table.columns().size();
 
+  // Rows by robot.
   std::map<std::string, ReportFrames> robots;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const std::string robot(table.text(row, robot_column));
@@ -55,7 +56,6 @@ void sort_by_robot(ReportData& data) {
 
   // If robots did not meet, the result holds only one of them: the one with the stamps of its poses.
   std::size_t most = 0;
-
   for (const ReportFrames& frames : data.frames) {
     std::size_t own = 0;
     for (const std::size_t row : frames.rows) {
@@ -74,6 +74,8 @@ void take_times_from_paths(ReportData& data) {
     first = std::min(first, path.poses.front().stamp);
     last = std::max(last, path.poses.back().stamp);
   }
+
+  // Unchanged without any pose.
   if (first <= last) {
     data.start_s = first;
     data.end_s = last;
@@ -93,12 +95,15 @@ void add_lost(const ReportFrames& frames, ReportData& data) {
   const CsvTable& table = *data.frame_table;
   const std::size_t state = table.column("state");
   LostStretch now;
+
+  // Ends a stretch of frames without poses.
   const auto end = [&](double to_s, double last_s) {
     if (now.lost + now.unreadable == 0) return;
     now.robot = frames.robot;
     now.to_s = to_s;
     now.gap_m = kNaN;
 
+    // Distance between the poses around it.
     for (const ReportPath& path : data.paths) {
       if (path.robot == frames.robot) {
         now.gap_m = gap_m(path.poses, data.start_s + now.from_s - 1e-5, data.start_s + last_s + 1e-5);
@@ -110,12 +115,15 @@ void add_lost(const ReportFrames& frames, ReportData& data) {
   };
   double last_s = 0.0;
 
+  // Frames from one tracked frame to the next.
   for (std::size_t i = 0; i < frames.rows.size(); ++i) {
     const std::string_view what = table.text(frames.rows[i], state);
     if (what == "tracked") {
       end(frames.time_s[i], last_s);
       continue;
     }
+
+    // A stretch begins or continues.
     if (now.lost + now.unreadable == 0) now.from_s = frames.time_s[i];
     ++(what == "unreadable" ? now.unreadable : now.lost);
     last_s = frames.time_s[i];
@@ -127,6 +135,7 @@ void add_lost(const ReportFrames& frames, ReportData& data) {
 }  // namespace
 
 void add_frames(ReportData& data) {
+  // A fused result has no frames.
   if (!data.fused_afterwards) {
     data.frame_table = table_of("frames.csv", data);
     data.timing_table = table_of("timing.csv", data);

@@ -27,6 +27,7 @@ std::string verdict_html(const ReportData& data) {
   const double without = number_at(s, "/frames/lost") + number_at(s, "/frames/unreadable");
   const std::string sentence = text_at(s, "/verdict/sentence");
 
+  // The verdict, then what limits it.
   std::string out;
   if (!flag_at(s, "/trustworthy")) {
     const std::string reason = text_at(s, "/reason");
@@ -47,6 +48,7 @@ std::string verdict_html(const ReportData& data) {
                       "wrong changes nothing but lengths.");
   }
 
+  // Limits that hold for any verdict.
   if (flag_at(s, "/stopped")) {
     out += banner("warn", "Stopped early",
                   fmt::format("The run was ended after {} of {} frames; this is what was mapped by then.",
@@ -56,6 +58,7 @@ std::string verdict_html(const ReportData& data) {
 
   if (!data.kind.empty()) out += banner("warn", "Only map.db", "The " + data.kind + ".");
 
+  // Parts that could not be read.
   if (!data.missing.empty()) {
     std::string list;
     for (const std::string& line : data.missing) list += "<li>" + viz::markup_text(line) + "</li>";
@@ -85,6 +88,7 @@ std::string figures_html(const ReportData& data) {
                          : std::pair{std::string("frames a second"), filled(s, "{/timing/fps:1}")}});
 }
 
+/// Frames read and tracked, with exceptions if there are any.
 std::string frames_text(const ReportData& data) {
   const auto& s = data.summary;
   std::string text = filled(s, "{/frames/read} of {/frames/available} read, {/frames/tracked} tracked");
@@ -96,6 +100,7 @@ std::string frames_text(const ReportData& data) {
   return text;
 }
 
+/// Axes and origin of the results.
 std::string frame_of_results(const ReportData& data) {
   const std::string up = text_at(data.summary, "/frame/up");
   const std::string x =
@@ -170,11 +175,13 @@ std::string lost_html(const ReportData& data) {
     return a.lost + a.unreadable > b.lost + b.unreadable;
   };
 
+  // Longest first, up to a limit.
   std::stable_sort(stretches.begin(), stretches.end(), longer);
   std::string columns = ">from (s)|>to (s)|>frames|>lost|>unreadable|>between the poses around (m)";
   const bool several = data.frames.size() > 1;
   if (several) columns += "|robot";
 
+  // One row per stretch.
   HtmlTable table(columns);
   for (std::size_t i = 0; i < std::min(kMost, stretches.size()); ++i) {
     const LostStretch& l = stretches[i];
@@ -183,6 +190,7 @@ std::string lost_html(const ReportData& data) {
                number(l.lost), number(l.unreadable), number_text(l.gap_m, 3), l.robot});
   }
 
+  // The rest is only counted.
   std::string out = table.html();
   if (stretches.size() > kMost)
     out += note(fmt::format("The {} longest of {} stretches.", kMost, stretches.size()));

@@ -57,9 +57,11 @@ std::string merge_evidence(const Json& m) {
            "{/span_m:2 m} and {/span_rad:0 deg} apart; they agree to {/spread_m:1 mm}"},
           {"Pairs of the pose graph", "{/pairs}, of which {/rejected} were rejected"}});
 
+  // The decision comes first.
   facts.insert(facts.begin(),
                {"Decision", flag_at(m, "/accepted") ? "merged" : "not merged: " + text_at(m, "/reason")});
 
+  // The best alternative, for places that are alike.
   if (number_at(m, "/alternative_m") > 0.0) {
     facts.emplace_back("Best other answer",
                        filled(m,
@@ -68,6 +70,7 @@ std::string merge_evidence(const Json& m) {
                               "chance), {/alternative_overlay/seen_through} seen through"));
   }
 
+  // Time and accuracy of the merge.
   if (number_at(m, "/time_s") >= 0.0)
     facts.emplace_back("Certain after", filled(m, "{/time_s:1 s of the recordings}"));
   if (!list_at(m, "/sigma").empty()) {
@@ -158,6 +161,7 @@ std::string closings_html(const ReportData& data) {
     return paragraph("No keyframe looked like a place seen before: there was no loop to close.");
   }
 
+  // Closed loops, and reasons of the others.
   JsonTable closed = trials_table(true), refused = trials_table(false);
   std::map<std::string, std::size_t> reasons;
   for (const Json& trial : list) {
@@ -165,10 +169,13 @@ std::string closings_html(const ReportData& data) {
       closed.row(trial);
       continue;
     }
+
+    // Reasons are counted by kind.
     ++reasons[kind_of_reason(text_at(trial, "/reason"))];
     if (refused.rows() < kMostRows) refused.row(trial);
   }
 
+  // Counts first, then disputes and closed loops.
   std::string out =
       paragraph(filled(data.summary,
                        "{/loops/candidates} candidates, {/loops/verified} verified; loops moved the map "
@@ -176,6 +183,7 @@ std::string closings_html(const ReportData& data) {
   if (!list_at(data.summary, "/loops/disputes").empty()) out += disputes_html(data);
   if (closed.rows() > 0) out += "<h3>Closed</h3>\n" + closed.html();
 
+  // Counts of reasons, then each trial.
   HtmlTable why("why candidates were refused|>times");
   for (const auto& [reason, times] : reasons) why.row({reason, count_text(static_cast<double>(times))});
   out += why.html();
@@ -183,6 +191,7 @@ std::string closings_html(const ReportData& data) {
     out += folded(fmt::format("Each refused candidate ({})", refused.rows()), refused.html());
   if (list.empty()) return out;
 
+  // Terms of the tables.
   return out +
          note(
              "Found: landmarks of the match that are where they should be. Overlap and contradiction: of the "
@@ -207,6 +216,7 @@ std::string merges_html(const ReportData& data) {
   const Json& list = list_at(data.summary, "/merges");
   if (list.empty()) return {};
 
+  // One row per merge.
   JsonTable overview({{"maps", ""},
                       {"", ""},
                       {">look alike", "{/candidates}"},
@@ -218,6 +228,7 @@ std::string merges_html(const ReportData& data) {
                       {">no like place", "{/log_odds_like:1}"},
                       {"why not", "{/reason:text}"}});
 
+  // Evidence, unfolded if there are few merges.
   std::string details;
   for (const Json& m : list) {
     const bool accepted = flag_at(m, "/accepted");
@@ -262,6 +273,7 @@ std::string refinement_html(const ReportData& data) {
            cameras_html(s) + fit_html(data);
   }
 
+  // Alignment of surfaces, motion of keyframes.
   Facts facts = filled_facts(
       s,
       {{"Local maps", "{/refine/local_maps}"},
@@ -271,6 +283,7 @@ std::string refinement_html(const ReportData& data) {
        {"Keyframes moved", "{/refine/mean_shift_m:1 mm} on average, {/refine/max_shift_m:1 mm} at most"}});
   facts.emplace_back("Standard deviation of keyframes relative to the first", sigma_text(s));
 
+  // Accuracy and adjustment of the whole.
   std::string out = facts_html(facts);
   if (number_at(s, "/refine/sigma_position_m/median") > 0.0) out += note(kSigmaNote);
   out += adjustment_html(s);

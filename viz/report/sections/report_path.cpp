@@ -39,6 +39,7 @@ class PathChart {
   }
 
   std::string draw() {
+    // From back to front.
     for (const ReportPath& path : data_.paths) add_truth(path);
     add_loops();
     for (const ReportPath& path : data_.paths) add(path);
@@ -67,6 +68,7 @@ class PathChart {
     viz::SvgLine line{path.robot.empty() ? "path" : path.robot, robot_kind(path.number), {}, {}};
     const double most_s = longest_step(path.poses);
 
+    // Gaps in time are drawn as lost.
     for (std::size_t i = 0; i < path.poses.size(); ++i) {
       const Eigen::Vector3d& here = path.poses[i].world_from_camera.translation;
       if (i > 0 && path.poses[i].stamp - path.poses[i - 1].stamp > most_s) {
@@ -75,10 +77,13 @@ class PathChart {
         put(lost_, here);
         lift(lost_);
       }
+
       put(line, here);
     }
 
     chart_.lines.push_back(std::move(line));
+
+    // Keyframes, start and end.
     viz::SvgDots keyframes{path.robot.empty() ? "keyframes" : "", robot_kind(path.number), {}, {}, 2.0};
     for (const geometry::StampedPose& pose : path.keyframes)
       put(keyframes, pose.world_from_camera.translation);
@@ -91,6 +96,8 @@ class PathChart {
     if (!path.accuracy) return;
     viz::SvgLine line{truth_reported_ ? "" : "truth", "truth", {}, {}};
     truth_reported_ = true;
+
+    // Truth in the map's frame.
     const geometry::Rigid3 estimate_from_truth = path.accuracy->truth_from_estimate.inverse();
     for (const evaluate::PoseError& pose : path.accuracy->poses) {
       put(line, estimate_from_truth * pose.truth.translation);
@@ -156,12 +163,15 @@ double reach(const geometry::Trajectory& poses, int axis) {
   return high->world_from_camera.translation[axis] - low->world_from_camera.translation[axis];
 }
 
+/// Length, speed and extent of each robot's path.
 std::string numbers(const ReportData& data) {
   RobotTable table;
   for (const ReportPath& path : data.paths) {
     if (path.poses.empty()) continue;
     const geometry::StampedPose& first = path.poses.front();
     const geometry::StampedPose& last = path.poses.back();
+
+    // A round trip ends at its start.
     const double apart_m = (last.world_from_camera.translation - first.world_from_camera.translation).norm();
     const double time_s = last.stamp - first.stamp;
 
@@ -170,6 +180,7 @@ std::string numbers(const ReportData& data) {
     table.value("Keyframes", count_text(static_cast<double>(path.keyframes.size())));
     table.value("From, to", fmt::format("{} to {}", number_text(first.stamp - data.start_s, 1, "s"),
                                         number_text(last.stamp - data.start_s, 1, "s")));
+
     table.value("Length", number_text(path.length_m(), 2, "m"));
     table.value("Mean speed", number_text(time_s > 0.0 ? path.length_m() / time_s : kNaN, 2, "m/s"));
     table.value("Extent along x, y, z", fmt::format("{:.2f}, {:.2f}, {:.2f} m", reach(path.poses, 0),

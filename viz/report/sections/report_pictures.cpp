@@ -60,6 +60,7 @@ std::string snapshots_html(ReportData& data) {
   return out;
 }
 
+/// The scene of the drawn pictures: cloud and paths.
 viz::Scene scene_of(const ReportData& data) {
   viz::Scene scene;
   scene.cloud = data.cloud->cloud;
@@ -86,6 +87,8 @@ core::Result<std::string> drawn_html(const ReportData& data, const fs::path& scr
     const auto drawn = viz::render_snapshot(scene, options, scratch);
     if (!drawn) return tl::unexpected<core::Error>(drawn.error());
     out += picture_html(scratch, caption.text);
+
+    // The page holds a copy.
     std::error_code ignored;
     fs::remove(scratch, ignored);
   }
@@ -97,6 +100,7 @@ core::Result<std::string> drawn_html(const ReportData& data, const fs::path& scr
 core::Result<std::string> pictures_html(ReportData& data, const fs::path& scratch) {
   std::string out = snapshots_html(data);
   if (out.empty()) {
+    // Drawn now if the run drew none.
     if (!data.extent) return std::string();
     auto drawn = drawn_html(data, scratch);
     if (!drawn) return drawn;

@@ -37,8 +37,9 @@ class RobotCharts {
     std::size_t tracked = 0, weak = 0, found_again = 0, keyframes = 0;
     const std::vector<double> weak_directions = column("weak_directions");
     const std::vector<double> relocalised = column("relocalised");
-
     const std::vector<double> keyframe = column("keyframe");
+
+    // Counts of frames.
     for (std::size_t i = 0; i < frames_.rows.size(); ++i) {
       tracked += is_tracked(i) ? 1U : 0U;
       weak += weak_directions[i] > 0.0 ? 1U : 0U;
@@ -46,6 +47,7 @@ class RobotCharts {
       keyframes += keyframe[i] >= 0.0 ? 1U : 0U;
     }
 
+    // Counts with their share of all frames.
     const auto count = [](std::size_t n) { return count_text(static_cast<double>(n)); };
     const auto share = [&](std::size_t n) {
       return fmt::format(
@@ -53,11 +55,13 @@ class RobotCharts {
           number_text(100.0 * static_cast<double>(n) / static_cast<double>(frames_.rows.size()), 1, "%"));
     };
 
+    // Number of features that fit, and their residuals.
     const auto family = [&](const char* name) {
       return fmt::format("{}; rms {}", number_text(core::quantile(column(name), 0.5), 0),
                          number_text(core::quantile(column(std::string(name) + "_rms"), 0.5), 2, "σ"));
     };
 
+    // Frames and their states.
     table.robot(frames_.robot);
     table.value("Frames", count(frames_.rows.size()));
     table.value("Tracked", share(tracked));
@@ -127,10 +131,12 @@ class RobotCharts {
     viz::SvgDots keyframes{"keyframes", "plain", {}, {}, 2.5, false};
     viz::SvgDots found{"found again by appearance", "k1", {}, {}, 4.5, true};
 
+    // Marks in the middle of the band.
     for (std::size_t i = 0; i < frames_.rows.size(); ++i) {
       const auto is = [&](const char* name, double least) {
         return table_.number(frames_.rows[i], table_.column(name)) >= least;
       };
+
       for (auto& [dots, yes] :
            {std::pair{&keyframes, is("keyframe", 0.0)}, {&found, is("relocalised", 1.0)}}) {
         if (!yes) continue;
@@ -139,6 +145,7 @@ class RobotCharts {
       }
     }
 
+    // Components of the map, then the marks.
     for (viz::SvgLine& component : components()) chart.lines.push_back(std::move(component));
     if (!found.x.empty()) chart.dots.push_back(found);
     chart.dots.push_back(keyframes);
@@ -157,6 +164,7 @@ class RobotCharts {
       }
       if (!(root >= 0.0) || lines.count(static_cast<int>(root)) != 0) continue;
 
+      // A component begins.
       viz::SvgLine& line = lines[static_cast<int>(root)];
       line.label = lines.size() == 1 ? "first map" : fmt::format("map of keyframe {:.0f}", root);
       line.kind = fmt::format("k{}", (lines.size() - 1) % 8);
@@ -164,6 +172,7 @@ class RobotCharts {
       line.y.push_back(0.5);
     }
 
+    // A single component needs no line.
     std::vector<viz::SvgLine> drawn;
     if (lines.size() < 2) return drawn;
     for (auto& [root, line] : lines) drawn.push_back(std::move(line));
@@ -179,6 +188,8 @@ class RobotCharts {
     chart.y_label = y_label;
     chart.x_range = viz::AxisRange{0.0, end_s_};
     if (last) chart.x_label = "time (s)";
+
+    // Peaks must not flatten the rest.
     const double usual = core::quantile(lines.front().y, 0.98);
     const double most = core::quantile(lines.front().y, 1.0);
     if (cut && most > 3.0 * usual) chart.y_range = viz::AxisRange{0.0, 2.0 * usual};
@@ -211,6 +222,8 @@ static std::string components_html(const ReportData& data) {
   for (const auto& component : list) {
     const bool joined = flag_at(component, "/joined");
     const double after = number_at(component, "/joined_s");
+
+    // Joined during the run, at its end, or not at all.
     const std::string when = !joined        ? "apart"
                              : after >= 0.0 ? fmt::format("joined after {:.1f} s, {:.0f} keyframes agree",
                                                           after, number_at(component, "/agreeing_keyframes"))
@@ -224,6 +237,7 @@ static std::string components_html(const ReportData& data) {
   const double dropped = number_at(data.summary, "/components/dropped");
   if (table.rows() == 0 && !(dropped > 0.0)) return {};
 
+  // Maps, and frames that have none.
   std::string out = "<h3>Maps begun when tracking was lost</h3>\n";
   if (table.rows() > 0) out += table.html();
   if (dropped > 0.0)

@@ -35,22 +35,26 @@ core::Result<std::string> viewer_html(ReportData& data, const ReportRequest& req
   wanted.input = data.folder;
   wanted.options.points = static_cast<int>(request.points);
 
+  // One map, or two to compare.
   exports::ExportRequest other = wanted;
   other.input = request.other;
   const auto silent = [](std::size_t, std::size_t) {};
   auto view = request.other.empty() ? exports::view_of(wanted, executor, log, silent)
                                     : exports::view_of_two(wanted, other, executor, log, silent);
 
+  // Only a requested comparison must succeed.
   if (!view && !request.other.empty()) return tl::unexpected<core::Error>(view.error());
   if (!view) {
     data.missing.push_back("the map to walk through is left out: " + view.error().message);
     return std::string();
   }
 
+  // Names as in the report.
   data.plan_html = plan_html(view->plan);
   view->scene.name = data.name;
   view->scene.clouds.front().name = data.name;
 
+  // The viewer, with notes for its use.
   const std::string placing =
       view->scene.placing.empty() ? std::string() : paragraph(view->scene.placing + ".");
   return placing +

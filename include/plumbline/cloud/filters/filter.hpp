@@ -32,7 +32,7 @@ struct FilterContext {
   /// Distance of neighbouring points, metres, if it is known (the voxel of a fused cloud); 0: unknown.
   double spacing_m = 0.0;
   /// The frame of the input, as far as it is known; a filter that moves points changes it. Null:
-  /// nothing, and nobody asks.
+  /// not known and not needed.
   CloudFrame* frame = nullptr;
   std::uint32_t seed = 0;  ///< seed of random choices
   /// Threads for the filters that can use several; without it one. Results do not depend on it.

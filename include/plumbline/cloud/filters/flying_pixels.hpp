@@ -22,7 +22,7 @@ namespace plumbline::cloud {
 /// program's own over the sensor's noise (docs/method/features.md); one pass over the image.
 ///
 /// For organised clouds, metres; filter() throws pcl::UnorganizedPointCloudException for others that have
-/// points. Neighbours are looked at among all points, indices given or not.
+/// points. Neighbours are searched among all points, with or without indices.
 template <typename PointT>
 class FlyingPixels : public ChoosingFilter<PointT> {
  public:
@@ -49,6 +49,8 @@ class FlyingPixels : public ChoosingFilter<PointT> {
     if (!this->input_->empty() && this->input_->height < 2) {
       throw pcl::UnorganizedPointCloudException("FlyingPixels needs an organised cloud");
     }
+
+    // Cells around a jump are removed as well
     Marks marks = mark();
     for (int i = 0; i < margin_; ++i) marks.jump = widened(marks.jump, this->input_->width);
     this->choose(indices,
@@ -65,7 +67,7 @@ class FlyingPixels : public ChoosingFilter<PointT> {
     float noise = 0.0F;            ///< metres along the ray below which there is no jump
   };
 
-  /// Looks at every pair of neighbours once.
+  /// Compares every pair of neighbours once.
   [[nodiscard]] Marks mark() const {
     const pcl::PointCloud<PointT>& cloud = *this->input_;
     const Eigen::Vector3f viewpoint =
@@ -74,6 +76,7 @@ class FlyingPixels : public ChoosingFilter<PointT> {
     Marks marks{std::vector<std::uint8_t>(cloud.size()), std::vector<std::uint8_t>(cloud.size())};
     const auto tangent = static_cast<float>(std::tan(max_angle_rad_));
 
+    // A jump is more than noise and slope explain
     const auto pair = [&](std::size_t a, std::size_t b, const View& view) {
       if (!pcl::isXYZFinite(cloud[b])) return;
       const Eigen::Vector3f difference = cloud[b].getVector3fMap() - cloud[a].getVector3fMap();
@@ -94,6 +97,7 @@ class FlyingPixels : public ChoosingFilter<PointT> {
       const std::size_t column = i % width;
       const bool below = i + width < cloud.size();
 
+      // Right, below and two diagonals: every pair once
       if (column + 1 < width) pair(i, i + 1, view);
       if (below) pair(i, i + width, view);
       if (below && column + 1 < width) pair(i, i + width + 1, view);
@@ -111,6 +115,7 @@ class FlyingPixels : public ChoosingFilter<PointT> {
     return view;
   }
 
+  // Marks the cells left, right, above and below as well.
   static std::vector<std::uint8_t> widened(const std::vector<std::uint8_t>& marks, std::size_t width) {
     std::vector<std::uint8_t> wider = marks;
     for (std::size_t i = 0; i < marks.size(); ++i) {

@@ -35,6 +35,8 @@ class IncidenceAngle : public ChoosingFilter<PointT> {
     const Eigen::Vector3f viewpoint =
         viewpoint_ ? *viewpoint_ : Eigen::Vector3f(cloud.sensor_origin_.template head<3>());
     const auto least = static_cast<float>(std::cos(max_angle_rad_));
+
+    // Either side of the surface may face the camera
     this->choose(indices, [&](std::size_t i) {
       if (!pcl::isNormalFinite(cloud[i])) return keep_unknown_;
       const Eigen::Vector3f ray = viewpoint - cloud[i].getVector3fMap();

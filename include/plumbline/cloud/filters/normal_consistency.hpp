@@ -41,6 +41,7 @@ class NormalConsistency : public ChoosingFilter<PointT> {
   using ChoosingFilter<PointT>::applyFilter;
 
   void applyFilter(pcl::Indices& indices) override {
+    // Only points with normals are neighbours
     const auto known = std::make_shared<pcl::Indices>();
     for (std::size_t i = 0; i < this->input_->size(); ++i) {
       if (has_normal(i)) known->push_back(static_cast<pcl::index_t>(i));
@@ -68,6 +69,8 @@ class NormalConsistency : public ChoosingFilter<PointT> {
     const auto piece = [&](std::size_t p) {
       for (std::size_t k = p * kPiece; k < std::min(count, (p + 1) * kPiece); ++k) body(k);
     };
+
+    // Several points per task, since a point is little work
     const std::size_t pieces = (count + kPiece - 1) / kPiece;
     if (executor_ != nullptr && pieces > 1) {
       executor_->parallel_for(pieces, piece);
@@ -84,6 +87,8 @@ class NormalConsistency : public ChoosingFilter<PointT> {
     const auto least = static_cast<float>(std::cos(max_angle_rad_));
     int agree = 0;
     int others = 0;
+
+    // Neighbours that face the same way
     for (const pcl::index_t index : near) {
       const auto j = static_cast<std::size_t>(index);
       if (j == i) continue;

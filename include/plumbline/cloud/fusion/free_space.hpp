@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Evidence of views against points that are not on their surfaces: a view looks through free space only.
+// Evidence of views against points that are not on their surfaces: the space between a camera and a surface
+// is free.
 #include <Eigen/Core>
 #include <cstdint>
 #include <vector>

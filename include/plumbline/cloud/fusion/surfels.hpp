@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Pieces of surface of a fused cloud: what makes walls thin, and what free space is judged by.
+// Pieces of surface of a fused cloud: they make walls thin, and free space is tested against them.
 //
 // A voxel much smaller than the sensor's noise averages little: a wall seen from afar becomes a slab of
 // voxels. Points that face the same way within a small block form a surfel; surfels of neighbouring blocks

@@ -80,7 +80,7 @@ enum class LargeCoordinates {
 void change_shift(Cloud& cloud, const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
 /// Checks that clouds with these shifts fit into one frame. Errors (kInput) name both: more than 10 km apart,
-/// which floats do not hold to a millimetre.
+/// where floats are not exact to a millimetre.
 core::Result<void> check_one_frame(const std::string& name, const Eigen::Vector3d& shift,
                                    const std::string& other_name, const Eigen::Vector3d& other_shift);
 

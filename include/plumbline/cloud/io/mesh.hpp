@@ -13,7 +13,7 @@ namespace plumbline::cloud {
 
 struct MeshOptions {
   double resolution_m = 0.02;  ///< edge length of the mesh; finer ones are not better
-  double reach_m = 0.05;       ///< surface further than this from every point is guessed and left out
+  double reach_m = 0.05;       ///< surface farther than this from every point was not seen and is left out
 
   void declare(core::OptionTable& table);
 };

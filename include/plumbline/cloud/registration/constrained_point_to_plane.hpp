@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Point-to-plane steps for PCL's registration loop that leave alone what surfaces do not hold: the length of
-// a corridor, a wall within its plane.
+// Point-to-plane steps for PCL's registration loop that make no step along directions that surfaces do not
+// constrain: along a corridor, or within a wall's plane.
 #include <pcl/registration/transformation_estimation.h>
 
 #include <array>
@@ -21,7 +21,7 @@ struct PlaneStep {
   /// Eigenvalues of the information, 1/m^2.
   Eigen::Matrix<double, 6, 1> eigenvalues = Eigen::Matrix<double, 6, 1>::Zero();
   Eigen::Matrix<double, 6, 6> directions = Eigen::Matrix<double, 6, 6>::Identity();  ///< its eigenvectors
-  std::array<bool, 6> held{};  ///< the others were left alone
+  std::array<bool, 6> held{};  ///< no step was made along the others
   int inliers = 0;
   double rms = 0.0;  ///< RMS of these, in standard deviations
 };

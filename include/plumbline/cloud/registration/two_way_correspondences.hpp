@@ -24,7 +24,7 @@ class TwoWayCorrespondences
   TwoWayCorrespondences(const SurfaceSearch& source, const SurfaceSearch& target, float min_cosine)
       : source_(source), target_search_(target), min_cosine_(min_cosine) {}
 
-  /// Points that look for a partner on the other side: indices into source and target.
+  /// Points to match with the other side: indices into source and target.
   void setSamples(pcl::Indices of_source, pcl::Indices of_target) {
     of_source_ = std::move(of_source);
     of_target_ = std::move(of_target);
