@@ -2,7 +2,6 @@
 #include <optional>
 #include <utility>
 
-#include "films/video_frames.hpp"
 #include "frame_images.hpp"
 #include "layout.hpp"
 #include "plumbline/sensor/rectify.hpp"
@@ -17,9 +16,7 @@ class FolderSource final : public FrameSource, public BodySource {
         layout_(std::move(layout)),
         camera_(std::move(camera)),
         rectified_(rectified),
-        rectifier_(camera_, rectified) {
-    if (!layout_.video.empty()) video_ = std::make_unique<VideoFrames>(layout_.video);
-  }
+        rectifier_(camera_, rectified) {}
 
   [[nodiscard]] const std::string& name() const override { return name_; }
   [[nodiscard]] const std::string& format() const override { return layout_.format; }
@@ -42,6 +39,7 @@ class FolderSource final : public FrameSource, public BodySource {
 
   [[nodiscard]] std::unique_ptr<FrameSource> taken_by(const sensor::Camera& better) const override {
     Layout layout = layout_;
+    if (auto again = layout_.images->opened_again()) layout.images = std::move(again);
     for (PairInfo& pair : layout.pairs) pair.depth_stamp += better.depth_delay_s - camera_.depth_delay_s;
     auto source = std::make_unique<FolderSource>(name_, std::move(layout), better, rectified_);
     source->set_doubt(doubt_);
@@ -50,18 +48,11 @@ class FolderSource final : public FrameSource, public BodySource {
 
   [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override {
     const PairInfo& pair = layout_.pairs.at(index);
-    auto color = read_color(layout_, pair.color_file, camera_.color, video_.get());
+    auto color = read_color(layout_, pair.color, camera_.color);
     if (!color) return tl::unexpected(color.error());
 
-    auto depth = read_depth(layout_, pair.depth_file, camera_.depth ? *camera_.depth : camera_.color,
-                            camera_.depth_scale);
+    auto depth = measured_depth(pair);
     if (!depth) return tl::unexpected(depth.error());
-
-    if (!layout_.confidence.empty()) {
-      const auto mask =
-          std::filesystem::path(layout_.confidence) / std::filesystem::path(pair.depth_file).filename();
-      if (auto masked = mask_depth(mask.string(), *depth); !masked) return tl::unexpected(masked.error());
-    }
 
     std::optional<sensor::Rectifier> own;
     if (pair.camera >= 0) own.emplace(camera_of(pair), rectified_);
@@ -79,22 +70,24 @@ class FolderSource final : public FrameSource, public BodySource {
           name_ + ": each image has its own camera, which a copy cannot describe; map the original");
     }
 
-    auto color = stored_image(pair.color_file);
+    auto color = stored_image(pair.color);
     if (!color) return tl::unexpected(color.error());
-    if (auto good = check_color(pair.color_file, color->pixels, camera_.color, layout_.color_reduction);
-        !good)
-      return tl::unexpected(good.error());
+    std::string problem = color_problem(color->pixels, camera_.color, layout_.color_reduction);
+    if (!problem.empty()) return core::input_error(color->name + ": " + problem);
 
-    auto depth = layout_.confidence.empty() ? stored_image(pair.depth_file) : masked_depth(pair);
+    auto depth = layout_.confidence.empty() ? stored_image(pair.depth) : masked_depth(pair);
     if (!depth) return tl::unexpected(depth.error());
-    const sensor::Pinhole& depth_camera = camera_.depth ? *camera_.depth : camera_.color;
-    if (auto good = check_depth(pair.depth_file, depth->pixels, depth_camera); !good)
-      return tl::unexpected(good.error());
+    problem = depth_problem(depth->pixels, depth_camera());
+    if (!problem.empty()) return core::input_error(depth->name + ": " + problem);
     return StoredPair{std::move(*color), std::move(*depth)};
   }
 
  private:
   static constexpr double kNearestPose_s = 0.02;
+
+  [[nodiscard]] const sensor::Pinhole& depth_camera() const {
+    return camera_.depth ? *camera_.depth : camera_.color;
+  }
 
   /// The camera of a pair, if each has its own (a lens that focuses): corrections found for the recording's
   /// camera are applied to it in proportion.
@@ -111,29 +104,23 @@ class FolderSource final : public FrameSource, public BodySource {
     return camera;
   }
 
-  [[nodiscard]] core::Result<StoredImage> stored_image(const std::string& name) const {
-    if (layout_.images) return layout_.images->stored(name);
-    core::Result<StoredImage> image;
-    if (is_file(name)) {
-      image = stored_file(name);
-    } else {  // in a film, or packed with all others
-      auto pixels = read_stored(layout_, name, video_.get());
-      if (!pixels) return tl::unexpected(pixels.error());
-      image->pixels = std::move(*pixels);
-    }
-    if (image) image->linked_out = linked_out(name);
+  [[nodiscard]] core::Result<StoredImage> stored_image(ImageId id) const {
+    auto image = layout_.images->stored(id);
+    if (!image) return image;
+    image->linked_out = linked_out(id);
+    image->name = layout_.images->describe(id);
     return image;
   }
 
   /// True if a link in the recording's folder leads out of it to an image's file, or to its film. The folder
   /// itself may be a link, and a list may name files elsewhere.
-  [[nodiscard]] bool linked_out(const std::string& name) const {
-    const auto inside = [](const std::filesystem::path& file, const std::filesystem::path& folder) {
-      const std::filesystem::path relative = file.lexically_relative(folder);
+  [[nodiscard]] bool linked_out(ImageId id) const {
+    const std::filesystem::path file = layout_.images->file(id);
+    if (file.empty()) return false;
+    const auto inside = [](const std::filesystem::path& path, const std::filesystem::path& folder) {
+      const std::filesystem::path relative = path.lexically_relative(folder);
       return !relative.empty() && *relative.begin() != "..";
     };
-    const auto film = is_file(name) ? std::nullopt : video_frame_of(name);
-    const std::filesystem::path file = film ? film->first : name;
 
     std::error_code problem;
     const auto named = std::filesystem::absolute(file, problem).lexically_normal();
@@ -143,15 +130,21 @@ class FolderSource final : public FrameSource, public BodySource {
     return !problem && !inside(real, std::filesystem::canonical(layout_.folder, problem)) && !problem;
   }
 
+  /// Depth without what the recorder's masks say is none.
+  [[nodiscard]] core::Result<cv::Mat> measured_depth(const PairInfo& pair) const {
+    auto depth = read_depth(layout_, pair.depth, depth_camera(), camera_.depth_scale);
+    if (!depth || layout_.confidence.empty()) return depth;
+    const auto mask = std::filesystem::path(layout_.confidence) / layout_.images->file(pair.depth).filename();
+    if (auto masked = mask_depth(mask.string(), *depth); !masked) return tl::unexpected(masked.error());
+    return depth;
+  }
+
   /// A copy has no masks, so masked depth is removed from the images.
   [[nodiscard]] core::Result<StoredImage> masked_depth(const PairInfo& pair) const {
-    auto depth = read_depth(layout_, pair.depth_file, camera_.depth ? *camera_.depth : camera_.color,
-                            camera_.depth_scale);
+    auto depth = measured_depth(pair);
     if (!depth) return tl::unexpected(depth.error());
-    const auto mask =
-        std::filesystem::path(layout_.confidence) / std::filesystem::path(pair.depth_file).filename();
-    if (auto masked = mask_depth(mask.string(), *depth); !masked) return tl::unexpected(masked.error());
-    return StoredImage{"", {}, std::move(*depth), linked_out(pair.depth_file)};
+    return StoredImage{
+        "", {}, std::move(*depth), linked_out(pair.depth), layout_.images->describe(pair.depth)};
   }
 
   std::string name_;
@@ -160,7 +153,6 @@ class FolderSource final : public FrameSource, public BodySource {
   sensor::Camera camera_;
   sensor::Pinhole rectified_;  ///< pinhole of the rectified images
   sensor::Rectifier rectifier_;
-  std::unique_ptr<VideoFrames> video_;  ///< thread-safe: frames are read in parallel
 };
 
 }  // namespace

@@ -9,8 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "films/azure_kinect.hpp"
-#include "films/video_frames.hpp"
 #include "layout.hpp"
 #include "plumbline/core/numbers.hpp"
 #include "plumbline/dataset/image_io.hpp"
@@ -28,12 +26,11 @@ std::string type_name(const cv::Mat& image) {
   return fmt::format("{} channel{} of {} bits", image.channels(), image.channels() == 1 ? "" : "s", bits);
 }
 
-core::Result<void> check_size(const std::string& file, const cv::Mat& image, const sensor::Pinhole& camera,
-                              const char* what) {
-  if (image.cols == camera.width && image.rows == camera.height) return {};
-  return core::input_error(fmt::format(
-      "{}: the {} image is {}x{}, the camera file says {}x{}; give the camera's own file (--camera)", file,
-      what, image.cols, image.rows, camera.width, camera.height));
+std::string size_problem(const cv::Mat& image, int width, int height, const char* what) {
+  if (image.cols == width && image.rows == height) return "";
+  return fmt::format(
+      "the {} image is {}x{}, the camera file says {}x{}; give the camera's own file (--camera)", what,
+      image.cols, image.rows, width, height);
 }
 
 bool channels_are_equal(const cv::Mat& image) {
@@ -46,11 +43,10 @@ bool channels_are_equal(const cv::Mat& image) {
   return true;
 }
 
-/// The first readable image of the pairs and its name; empty if none is readable.
-template <typename Name>
-std::pair<std::string, cv::Mat> first_image(const Layout& layout, const Name& name) {
+/// The first readable image of the pairs and where it is; empty if none is readable.
+std::pair<ImageId, cv::Mat> first_image(const Layout& layout, ImageId PairInfo::*image) {
   for (const PairInfo& pair : layout.pairs) {
-    if (auto image = read_stored(layout, name(pair))) return {name(pair), std::move(*image)};
+    if (auto read = layout.images->read(pair.*image)) return {pair.*image, std::move(*read)};
   }
   return {};
 }
@@ -83,17 +79,6 @@ cv::Mat depth_units(const cv::Mat& metres, double depth_scale) {
   return units;
 }
 
-core::Result<cv::Mat> read_stored(const Layout& layout, const std::string& name, VideoFrames* video) {
-  if (layout.images != nullptr) return layout.images->image(name);
-  if (layout.packed != nullptr) {
-    if (auto packed = layout.packed->read(name)) return std::move(*packed);
-  }
-  const auto frame = video_frame_of(name);
-  if (!frame || is_file(name)) return read_image(name);
-  if (video != nullptr) return video->read(frame->second);
-  return VideoFrames(frame->first).read(frame->second);
-}
-
 core::Result<void> mask_depth(const std::string& mask_file, cv::Mat& depth) {
   auto mask = read_image(mask_file);
   if (!mask) return tl::unexpected(mask.error());
@@ -105,36 +90,26 @@ core::Result<void> mask_depth(const std::string& mask_file, cv::Mat& depth) {
   return {};
 }
 
-core::Result<void> check_color(const std::string& name, const cv::Mat& image, const sensor::Pinhole& camera,
-                               int reduction) {
+std::string color_problem(const cv::Mat& image, const sensor::Pinhole& camera, int reduction) {
   const int channels = image.channels();
   const bool colors = channels == 3 || channels == 4;
-  if (!(image.depth() == CV_8U && (colors || channels == 1)) && !(image.depth() == CV_16U && colors)) {
-    return core::input_error(
-        fmt::format("{}: the colour image has {}; 8 bits are needed", name, type_name(image)));
-  }
-
-  sensor::Pinhole stored = camera;
-  stored.width *= reduction;
-  stored.height *= reduction;
-  return check_size(name, image, stored, "colour");
+  if (!(image.depth() == CV_8U && (colors || channels == 1)) && !(image.depth() == CV_16U && colors))
+    return fmt::format("the colour image has {}; 8 bits are needed", type_name(image));
+  return size_problem(image, camera.width * reduction, camera.height * reduction, "colour");
 }
 
-core::Result<void> check_depth(const std::string& name, const cv::Mat& image, const sensor::Pinhole& camera) {
+std::string depth_problem(const cv::Mat& image, const sensor::Pinhole& camera) {
   const bool one = image.type() == CV_16UC1 || image.type() == CV_32FC1 || image.type() == CV_64FC1;
   if (!one && !(image.type() == CV_16UC3 && channels_are_equal(image))) {
-    return core::input_error(
-        fmt::format("{}: the depth image has {}; a 16-bit PNG or PGM with one channel is needed, or floats "
-                    "of 32 bits in metres (TIFF or EXR)",
-                    name, type_name(image)));
+    return fmt::format(
+        "the depth image has {}; a 16-bit PNG or PGM with one channel is needed, or floats "
+        "of 32 bits in metres (TIFF or EXR)",
+        type_name(image));
   }
-  return check_size(name, image, camera, "depth");
+  return size_problem(image, camera.width, camera.height, "depth");
 }
 
-core::Result<cv::Mat> color_pixels(const std::string& name, cv::Mat image, const sensor::Pinhole& camera,
-                                   int reduction) {
-  if (auto good = check_color(name, image, camera, reduction); !good) return tl::unexpected(good.error());
-
+cv::Mat color_pixels(cv::Mat image, const sensor::Pinhole& camera, int reduction) {
   if (reduction > 1) cv::resize(image, image, {camera.width, camera.height}, 0.0, 0.0, cv::INTER_AREA);
   if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / 257.0);  // 65535 becomes 255
   if (image.channels() == 1) cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);
@@ -142,24 +117,27 @@ core::Result<cv::Mat> color_pixels(const std::string& name, cv::Mat image, const
   return image;
 }
 
-core::Result<cv::Mat> depth_pixels(const std::string& name, cv::Mat image, const sensor::Pinhole& camera,
-                                   double depth_scale) {
-  if (auto good = check_depth(name, image, camera); !good) return tl::unexpected(good.error());
+cv::Mat depth_pixels(cv::Mat image, double depth_scale) {
   if (image.type() == CV_64FC1) image.convertTo(image, CV_32F);
   if (image.type() == CV_16UC3) cv::extractChannel(image, image, 0);
   return image.type() == CV_32FC1 ? depth_units(image, depth_scale) : image;
 }
 
-core::Result<cv::Mat> read_color(const Layout& layout, const std::string& file, const sensor::Pinhole& camera,
-                                 VideoFrames* video) {
-  auto image = read_stored(layout, file, video);
-  return image ? color_pixels(file, std::move(*image), camera, layout.color_reduction) : image;
+core::Result<cv::Mat> read_color(const Layout& layout, ImageId id, const sensor::Pinhole& camera) {
+  auto image = layout.images->read(id);
+  if (!image) return image;
+  const std::string problem = color_problem(*image, camera, layout.color_reduction);
+  if (!problem.empty()) return core::input_error(layout.images->describe(id) + ": " + problem);
+  return color_pixels(std::move(*image), camera, layout.color_reduction);
 }
 
-core::Result<cv::Mat> read_depth(const Layout& layout, const std::string& file, const sensor::Pinhole& camera,
+core::Result<cv::Mat> read_depth(const Layout& layout, ImageId id, const sensor::Pinhole& camera,
                                  double depth_scale) {
-  auto image = read_stored(layout, file);
-  return image ? depth_pixels(file, std::move(*image), camera, depth_scale) : image;
+  auto image = layout.images->read(id);
+  if (!image) return image;
+  const std::string problem = depth_problem(*image, camera);
+  if (!problem.empty()) return core::input_error(layout.images->describe(id) + ": " + problem);
+  return depth_pixels(std::move(*image), depth_scale);
 }
 
 sensor::RgbdFrame rectified_frame(std::size_t index, const PairInfo& pair, const cv::Mat& color,
@@ -175,11 +153,11 @@ sensor::RgbdFrame rectified_frame(std::size_t index, const PairInfo& pair, const
 }
 
 core::Result<void> check_image_kinds(const Layout& layout, sensor::Camera& camera, core::Log& log) {
-  const cv::Mat color = first_image(layout, [](const PairInfo& pair) { return pair.color_file; }).second;
+  const cv::Mat color = first_image(layout, &PairInfo::color).second;
   if (!color.empty() && color.depth() == CV_16U && color.channels() >= 3)
     log.info("the colour images have 16 bits a channel; the upper 8 are used");
 
-  const auto [depth_file, depth] = first_image(layout, [](const PairInfo& pair) { return pair.depth_file; });
+  const auto [id, depth] = first_image(layout, &PairInfo::depth);
   if (depth.type() == CV_16UC3 && channels_are_equal(depth))
     log.info("the depth images have three equal channels; the first is used");
   if (depth.type() != CV_32FC1 && depth.type() != CV_64FC1) return {};
@@ -192,7 +170,7 @@ core::Result<void> check_image_kinds(const Layout& layout, sensor::Camera& camer
     return core::input_error(
         fmt::format("{}: depth stored as floats is taken as metres, and its median is {:.4g}; store metres "
                     "(divide millimetres by 1000)",
-                    depth_file, *median));
+                    layout.images->describe(id), *median));
   }
 
   camera.depth_scale = kFloatDepthScale;

@@ -15,41 +15,27 @@
 namespace plumbline::dataset {
 
 struct Layout;
-class VideoFrames;
 
 /// Units per metre of the 16-bit image into which depth in floating-point metres is converted: steps of 0.2
 /// mm, up to 13.1 m.
 inline constexpr double kFloatDepthScale = 5000.0;
 
-/// Reads an image from a file, a video (video_frame_name), the file in which a layout's images are packed, or
-/// a bag.
-core::Result<cv::Mat> read_stored(const Layout& layout, const std::string& name,
-                                  VideoFrames* video = nullptr);
+/// What is wrong with pixels as an image of the camera, `reduction` times as large as its size; "": nothing.
+std::string color_problem(const cv::Mat& image, const sensor::Pinhole& camera, int reduction = 1);
+std::string depth_problem(const cv::Mat& image, const sensor::Pinhole& camera);
 
-/// A file's bytes and pixels. Error (kInput): cannot be read, or is no image.
-core::Result<StoredImage> stored_file(const std::string& file);
-
-/// Checks that pixels are those of an image that color_pixels and depth_pixels take. Error (kInput): names
-/// the image and what is wrong.
-core::Result<void> check_color(const std::string& name, const cv::Mat& image, const sensor::Pinhole& camera,
-                               int reduction = 1);
-core::Result<void> check_depth(const std::string& name, const cv::Mat& image, const sensor::Pinhole& camera);
-
-/// Converts pixels that were already read into those of read_color and read_depth; `name` is for messages.
-core::Result<cv::Mat> color_pixels(const std::string& name, cv::Mat image, const sensor::Pinhole& camera,
-                                   int reduction = 1);
-core::Result<cv::Mat> depth_pixels(const std::string& name, cv::Mat image, const sensor::Pinhole& camera,
-                                   double depth_scale);
+/// Converts pixels without a problem into those of read_color and read_depth.
+cv::Mat color_pixels(cv::Mat image, const sensor::Pinhole& camera, int reduction = 1);
+cv::Mat depth_pixels(cv::Mat image, double depth_scale);
 
 /// CV_8UC3, BGR, of the camera's size; stored Layout::color_reduction times as large. Grey, transparent and
-/// 16-bit images are converted. Error (kInput): names the file and what is wrong.
-core::Result<cv::Mat> read_color(const Layout& layout, const std::string& file, const sensor::Pinhole& camera,
-                                 VideoFrames* video = nullptr);
+/// 16-bit images are converted. Error (kInput): names the image and what is wrong.
+core::Result<cv::Mat> read_color(const Layout& layout, ImageId image, const sensor::Pinhole& camera);
 
 /// CV_16UC1 of the camera's size, in units of 1 / depth_scale metres; 0 means no measurement. Images of 16
 /// bits with one channel are taken as they are, those with three equal channels too; floats are metres and
 /// rounded to units.
-core::Result<cv::Mat> read_depth(const Layout& layout, const std::string& file, const sensor::Pinhole& camera,
+core::Result<cv::Mat> read_depth(const Layout& layout, ImageId image, const sensor::Pinhole& camera,
                                  double depth_scale);
 
 /// Converts metres (CV_32FC1) to units of 1 / depth_scale metres; values that are not finite, not positive or

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "images/image_source.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/log.hpp"
 #include "plumbline/dataset/body_readings.hpp"
@@ -18,24 +19,11 @@
 
 namespace plumbline::dataset {
 
-class AzureKinectFile;
-
-/// Images that are in no files of their own, but in a bag. Thread-safe.
-class ImageStore {
- public:
-  virtual ~ImageStore() = default;
-  /// The image as it is stored; `name` is one of those in the layout's pairs. Error (kInput): names what is
-  /// wrong.
-  [[nodiscard]] virtual core::Result<cv::Mat> image(const std::string& name) const = 0;
-  /// The same without decoding, where it is stored as an image file's bytes.
-  [[nodiscard]] virtual core::Result<StoredImage> stored(const std::string& name) const = 0;
-};
-
 struct Layout {
   std::string format;
-  std::vector<PairInfo> pairs;  ///< sorted by colour stamp; files with their folder in front
-  std::optional<geometry::Trajectory> truth;
-  std::string video{};  ///< the film that colour is in; "" where it is in files
+  std::vector<PairInfo> pairs{};          ///< sorted by colour stamp
+  std::shared_ptr<ImageSource> images{};  ///< where the images are
+  std::optional<geometry::Trajectory> truth{};
   /// Folder of masks named as the depth images, 0 where there is no measurement; "": none.
   std::string confidence{};
   int color_reduction = 1;  ///< colour images are made smaller by this factor while reading
@@ -43,10 +31,8 @@ struct Layout {
   std::optional<sensor::CameraReading> camera{};
   /// The pinhole of each pair (PairInfo::camera) for its stored colour image, where they differ.
   std::vector<sensor::Pinhole> frame_cameras{};
-  std::shared_ptr<AzureKinectFile> packed{};   ///< the file that all images are in; null: each has its own
   bool truth_is_odometry = false;              ///< the recorder's own poses, known while recording
   bool gives_odometry = false;                 ///< frames have them
-  std::shared_ptr<const ImageStore> images{};  ///< where the images are; null: in files
   std::shared_ptr<const BodyReadings> body{};  ///< of wheels and inertial sensor; null: none
   std::filesystem::path folder{};              ///< the recording's, as it was given
   std::size_t missing = 0;                     ///< frames of the part that is read whose files do not exist
@@ -64,7 +50,7 @@ inline double seconds_of(std::int64_t nanoseconds) {
   return static_cast<double>(static_cast<long double>(nanoseconds) / 1e9L);
 }
 
-/// A stamped file of a list, with its place for messages.
+/// A stamped file of a list, with its place for messages; images that are no files have stamps alone.
 struct StampedFile {
   double stamp = 0.0;
   std::string file;
@@ -128,19 +114,23 @@ std::vector<long long> numbers_of(const std::string& name);
 std::optional<geometry::Rigid3> read_pose_file(const std::string& file);
 /// Images of a folder whose names have a number, by the first number in them; a number seen twice keeps the
 /// first name.
-std::vector<std::pair<long long, std::string>> numbered_images(const std::filesystem::path& folder,
-                                                               const std::string& prefix = "");
+using NumberedFiles = std::vector<std::pair<long long, std::string>>;
+NumberedFiles numbered_images(const std::filesystem::path& folder, const std::string& prefix = "");
 /// Pairs of images with one number, stamps number / fps.
-std::vector<PairInfo> pair_numbered(const std::vector<std::pair<long long, std::string>>& color,
-                                    const std::vector<std::pair<long long, std::string>>& depth, double fps);
+Layout numbered_layout(const char* format, const NumberedFiles& color, const NumberedFiles& depth,
+                       double fps);
 
 /// Time between two images, microseconds, the resolution of stamps in seconds since 1970; pairs are chosen
 /// by it. `depth_delay_s`: depth was taken so long after its stamp.
 long long stamp_gap_us(double color_stamp, double depth_stamp, double depth_delay_s);
 
+/// The images of two lists, by their places in these.
+std::shared_ptr<ImageSource> images_of(const std::vector<StampedFile>& color,
+                                       const std::vector<StampedFile>& depth);
+
 /// Pairs by when images were taken, depth `depth_delay_s` after its stamps: smallest difference first, each
-/// file used once; both lists sorted by stamp. The result has the lists' stamps and is sorted by that of
-/// colour.
+/// file used once; both lists sorted by stamp. The result has the lists' stamps and places and is sorted by
+/// the stamp of colour.
 std::vector<PairInfo> pair_by_stamp(const std::vector<StampedFile>& color,
                                     const std::vector<StampedFile>& depth, double max_gap_s,
                                     double depth_delay_s = 0.0);

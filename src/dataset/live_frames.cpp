@@ -329,14 +329,14 @@ core::Result<LiveFrame> stored_frame(const FrameSource& source, std::size_t inde
   LiveFrame frame;
   frame.stamp = info.stamp;
   frame.depth_stamp = info.depth_stamp - camera.depth_delay_s;
-  auto color = color_pixels(info.color_file, std::move(pair->color.pixels), camera.color);
-  if (!color) return tl::unexpected<core::Error>(color.error());
-
   const sensor::Pinhole& depth_camera = camera.depth ? *camera.depth : camera.color;
-  auto depth = depth_pixels(info.depth_file, std::move(pair->depth.pixels), depth_camera, camera.depth_scale);
-  if (!depth) return tl::unexpected<core::Error>(depth.error());
-  frame.color = std::move(*color);
-  frame.depth = std::move(*depth);
+  const std::string color = color_problem(pair->color.pixels, camera.color);
+  if (!color.empty()) return core::input_error(pair->color.name + ": " + color);
+  const std::string depth = depth_problem(pair->depth.pixels, depth_camera);
+  if (!depth.empty()) return core::input_error(pair->depth.name + ": " + depth);
+
+  frame.color = color_pixels(std::move(pair->color.pixels), camera.color);
+  frame.depth = depth_pixels(std::move(pair->depth.pixels), camera.depth_scale);
   return frame;
 }
 

@@ -11,7 +11,6 @@
 #include "bags/bag_recording.hpp"
 #include "body/body_tables.hpp"
 #include "depth_check.hpp"
-#include "films/video_frames.hpp"
 #include "frame_images.hpp"
 #include "layout.hpp"
 #include "plumbline/dataset/frame_source.hpp"
@@ -88,15 +87,16 @@ void round_stamps(std::vector<PairInfo>& pairs) {
 }
 
 /// Keeps only the first of several frames with the same stamp in microseconds, the unit of written
-/// trajectories: their poses could not be distinguished there. `pairs` are sorted by stamp.
-void drop_same_stamps(const std::string& folder, std::vector<PairInfo>& pairs, core::Log& log) {
+/// trajectories: their poses could not be distinguished there. Pairs are sorted by stamp.
+void drop_same_stamps(const std::string& folder, Layout& layout, core::Log& log) {
+  std::vector<PairInfo>& pairs = layout.pairs;
   const auto microseconds = [](const PairInfo& pair) { return std::llrint(pair.stamp * 1e6); };
   const auto same = [&](const PairInfo& a, const PairInfo& b) { return microseconds(a) == microseconds(b); };
   const auto first = std::adjacent_find(pairs.begin(), pairs.end(), same);
   if (first == pairs.end()) return;
 
   const double stamp = first->stamp;
-  const std::string dropped = (first + 1)->color_file;
+  const std::string dropped = layout.images->describe((first + 1)->color);
   const auto end = std::unique(pairs.begin(), pairs.end(), same);
   log.warning(fmt::format(
       "{}: {} of {} frames have the stamp of the frame before and are dropped (the first at {:.6f}: {})",
@@ -110,13 +110,12 @@ struct ListedFrames {
   std::vector<std::optional<std::size_t>> places;  ///< among the layout's pairs; none: a file is missing
 };
 
-/// The first of a pair's files that does not exist; "": both do, or they are in a film or in a bag.
+/// The first of a pair's files that does not exist; "": both do, or all images are in one file.
 std::string missing_file(const Layout& layout, const PairInfo& pair) {
-  if (layout.images || layout.packed) return "";
-  for (const std::string* name : {&pair.color_file, &pair.depth_file}) {
-    if (!layout.video.empty() && video_frame_of(*name)) continue;
+  for (const ImageId id : {pair.color, pair.depth}) {
+    const fs::path file = layout.images->file(id);
     std::error_code ignored;
-    if (fs::status(*name, ignored).type() == fs::file_type::not_found) return *name;
+    if (!file.empty() && fs::status(file, ignored).type() == fs::file_type::not_found) return file.string();
   }
   return "";
 }
@@ -248,7 +247,7 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
   if (layout_options.body && layout->body == nullptr && is_folder(folder))
     layout->body = read_body_tables(folder, !layout->truth_is_odometry, log);
   round_stamps(layout->pairs);
-  drop_same_stamps(folder.string(), layout->pairs, log);
+  drop_same_stamps(folder.string(), *layout, log);
   const auto listed = leave_out_missing(folder.string(), *layout, log);
   if (!listed) return tl::unexpected(listed.error());
   if (!chosen) return tl::unexpected(chosen.error());

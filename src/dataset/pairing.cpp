@@ -22,6 +22,14 @@ long long stamp_gap_us(double color_stamp, double depth_stamp, double depth_dela
   return std::llround(std::abs(depth_stamp - (color_stamp - depth_delay_s)) / kStampResolution);
 }
 
+std::shared_ptr<ImageSource> images_of(const std::vector<StampedFile>& color,
+                                       const std::vector<StampedFile>& depth) {
+  auto images = std::make_shared<FileImages>();
+  for (const StampedFile& file : color) images->add(ImageList::kColor, file.file);
+  for (const StampedFile& file : depth) images->add(ImageList::kDepth, file.file);
+  return images;
+}
+
 std::vector<PairInfo> pair_by_stamp(const std::vector<StampedFile>& color,
                                     const std::vector<StampedFile>& depth, double max_gap_s,
                                     double depth_delay_s) {
@@ -52,8 +60,8 @@ std::vector<PairInfo> pair_by_stamp(const std::vector<StampedFile>& color,
   std::vector<PairInfo> pairs;
   for (std::size_t i = 0; i < color.size(); ++i) {
     if (depth_of[i] == none) continue;
-    const StampedFile& d = depth[depth_of[i]];
-    pairs.push_back({color[i].stamp, d.stamp, color[i].file, d.file});
+    const std::size_t j = depth_of[i];
+    pairs.push_back({color[i].stamp, depth[j].stamp, {ImageList::kColor, i}, {ImageList::kDepth, j}});
   }
 
   return pairs;

@@ -7,7 +7,6 @@
 #include <array>
 #include <cmath>
 
-#include "frame_images.hpp"
 #include "plumbline/core/git_lfs.hpp"
 #include "plumbline/dataset/summary.hpp"
 
@@ -103,17 +102,14 @@ core::Result<void> add_depth_camera(const fs::path& folder, sensor::Camera& came
 }
 
 /// Size of the first of these images that can be read.
-template <typename Name>
-std::optional<cv::Size> image_size(const Layout& layout, const Name& name) {
+std::optional<cv::Size> image_size(const Layout& layout, ImageId PairInfo::*image) {
   for (const PairInfo& pair : layout.pairs) {
-    if (const auto image = read_stored(layout, name(pair))) return image->size();
+    if (const auto read = layout.images->read(pair.*image)) return read->size();
   }
   return std::nullopt;
 }
 
-std::optional<cv::Size> color_size(const Layout& layout) {
-  return image_size(layout, [](const PairInfo& pair) { return pair.color_file; });
-}
+std::optional<cv::Size> color_size(const Layout& layout) { return image_size(layout, &PairInfo::color); }
 
 double usual_depth_scale(const Layout& layout) { return layout.format == "tum" ? 5000.0 : 1000.0; }
 
@@ -199,26 +195,25 @@ void reduce_color(sensor::Camera& camera) {
   }
 }
 
-core::Result<cv::Size> size_in(const Layout& layout, bool depth) {
-  const auto size =
-      image_size(layout, [depth](const PairInfo& pair) { return depth ? pair.depth_file : pair.color_file; });
-  if (size) return *size;
-  const PairInfo& first = layout.pairs.front();
-  const auto image = read_stored(layout, depth ? first.depth_file : first.color_file);
+core::Result<cv::Size> size_in(const Layout& layout, ImageId PairInfo::*image) {
+  if (const auto size = image_size(layout, image)) return *size;
+  const ImageId first = layout.pairs.front().*image;
+  const auto read = layout.images->read(first);
   return core::input_error(fmt::format("{}; no {} image can be read to tell its size, and this is the first",
-                                       image ? "" : image.error().message, depth ? "depth" : "colour"));
+                                       read ? "" : read.error().message,
+                                       first.list == ImageList::kDepth ? "depth" : "colour"));
 }
 
 /// Sizes that the camera file does not say, from the images.
 core::Result<void> add_sizes(const ChosenCamera& chosen, const Layout& layout, sensor::Camera& camera) {
   if (!chosen.reading.has_size) {
-    const auto size = size_in(layout, false);
+    const auto size = size_in(layout, &PairInfo::color);
     if (!size) return tl::unexpected(size.error());
     camera.color.width = size->width;
     camera.color.height = size->height;
   }
   if (!camera.depth || camera.depth->width != 0) return {};
-  const auto size = size_in(layout, true);
+  const auto size = size_in(layout, &PairInfo::depth);
   if (!size) return tl::unexpected(size.error());
   camera.depth->width = size->width;
   camera.depth->height = size->height;
@@ -226,12 +221,11 @@ core::Result<void> add_sizes(const ChosenCamera& chosen, const Layout& layout, s
 }
 
 /// The most frequent size of a few images, spread over the recording; none if none can be read.
-std::optional<cv::Size> usual_size(const Layout& layout, bool depth) {
+std::optional<cv::Size> usual_size(const Layout& layout, ImageId PairInfo::*image) {
   constexpr std::size_t kLookedAt = 5;
   std::vector<cv::Size> sizes;
   for (const std::size_t i : spread(layout.pairs.size(), kLookedAt)) {
-    const auto image = read_stored(layout, depth ? layout.pairs[i].depth_file : layout.pairs[i].color_file);
-    if (image) sizes.push_back(image->size());
+    if (const auto read = layout.images->read(layout.pairs[i].*image)) sizes.push_back(read->size());
   }
   const auto count = [&](const cv::Size& size) { return std::count(sizes.begin(), sizes.end(), size); };
   const auto most = std::max_element(sizes.begin(), sizes.end(),
@@ -244,8 +238,8 @@ std::optional<cv::Size> usual_size(const Layout& layout, bool depth) {
 void share_calibration(const Layout& layout, sensor::Camera& camera) {
   constexpr double kSameShape = 0.01;
   if (camera.depth) return;
-  const auto color = usual_size(layout, false);
-  const auto depth = usual_size(layout, true);
+  const auto color = usual_size(layout, &PairInfo::color);
+  const auto depth = usual_size(layout, &PairInfo::depth);
   if (!color || !depth || *color == *depth) return;
   const double shape = static_cast<double>(color->width) * depth->height;
   if (std::abs(static_cast<double>(depth->width) * color->height / shape - 1.0) > kSameShape) return;
@@ -260,14 +254,14 @@ void share_calibration(const Layout& layout, sensor::Camera& camera) {
 
 /// Scales a camera that, according to the layout, may be that of images of another size.
 void scale_to_images(const Layout& layout, sensor::Camera& camera) {
-  const auto color = usual_size(layout, false);
+  const auto color = usual_size(layout, &PairInfo::color);
   if (!color || color->width == camera.color.width) return;
   if (color->width * camera.color.height != color->height * camera.color.width) return;
   camera.color = camera.color.resized(color->width, color->height);
 }
 
 core::Result<sensor::Camera> guess(const fs::path& folder, const Layout& layout, core::Log& log) {
-  if (const auto size = size_in(layout, false); !size) return tl::unexpected(size.error());
+  if (const auto size = size_in(layout, &PairInfo::color); !size) return tl::unexpected(size.error());
   const auto camera = guessed_camera(layout);
   const bool has_place = is_folder(folder);  // for a camera.yaml; bags and live cameras have none
   if (!camera) {

@@ -24,11 +24,19 @@ namespace plumbline::dataset {
 
 class MessageStream;
 
+enum class ImageList : std::uint8_t { kColor, kDepth };
+
+/// Where an image is: its place in one of the lists of what holds the images, in the order of that.
+struct ImageId {
+  ImageList list = ImageList::kColor;
+  std::size_t number = 0;
+};
+
 struct PairInfo {
   double stamp = 0.0;        ///< stamp of colour, seconds
   double depth_stamp = 0.0;  ///< seconds; the camera's depth_delay_s is in it
-  std::string color_file;    ///< for messages; empty when there is no file
-  std::string depth_file;
+  ImageId color;
+  ImageId depth{ImageList::kDepth};
   int camera = -1;  ///< position among Layout::frame_cameras; -1: the recording's camera
 };
 
@@ -38,6 +46,7 @@ struct StoredImage {
   std::vector<std::uint8_t> bytes;  ///< bytes of the file
   cv::Mat pixels;                   ///< as read_image gives them
   bool linked_out = false;          ///< a link in the recording's folder leads out of it to the file
+  std::string name{};               ///< for messages
 };
 
 struct StoredPair {

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <utility>
 
@@ -18,35 +17,37 @@ namespace plumbline::dataset {
 namespace {
 
 /// One image topic, its messages by stamp.
-struct ImageList {
+struct TopicImages {
   BagTopic topic;
   const MessageDecoder* decoder = nullptr;
   std::vector<ImageEntry> images;
-  std::string prefix;  ///< beginning of image names: "office.mcap:/camera/color/image_raw#"
 };
 
 class BagImages final : public MessageImages {
  public:
-  BagImages(std::vector<std::shared_ptr<const BagFile>> files, ImageList color, ImageList depth)
-      : files_(std::move(files)), color_(std::move(color)), depth_(std::move(depth)) {}
+  BagImages(const BagSurvey& survey, TopicImages color, TopicImages depth)
+      : path_(survey.path), files_(survey.files), color_(std::move(color)), depth_(std::move(depth)) {}
 
- private:
-  [[nodiscard]] core::Result<Place> place_of(const std::string& name) const override {
-    for (const ImageList* list : {&color_, &depth_}) {
-      if (name.compare(0, list->prefix.size(), list->prefix) != 0) continue;
-      std::size_t number = 0;
-      std::from_chars(name.data() + list->prefix.size(), name.data() + name.size(), number);
-      const MessagePlace& place = list->images.at(number).place;
-      auto bytes = files_.at(place.file)->read(place);
-      if (!bytes) return tl::unexpected(bytes.error());
-      return Place{list->topic.type == "sensor_msgs/Image", list->decoder, std::move(*bytes)};
-    }
-    return core::input_error(name + ": is not an image of this bag");
+  [[nodiscard]] std::string describe(ImageId id) const override {
+    return fmt::format("{}:{}#{}", path_, list_of(id).topic.name, id.number);
   }
 
+ private:
+  [[nodiscard]] const TopicImages& list_of(ImageId id) const {
+    return id.list == ImageList::kColor ? color_ : depth_;
+  }
+  [[nodiscard]] core::Result<Message> message_of(ImageId id) const override {
+    const TopicImages& list = list_of(id);
+    const MessagePlace& place = list.images.at(id.number).place;
+    auto bytes = files_.at(place.file)->read(place);
+    if (!bytes) return tl::unexpected(bytes.error());
+    return Message{list.topic.type == "sensor_msgs/Image", list.decoder, std::move(*bytes)};
+  }
+
+  std::string path_;
   std::vector<std::shared_ptr<const BagFile>> files_;
-  ImageList color_;
-  ImageList depth_;
+  TopicImages color_;
+  TopicImages depth_;
 };
 
 /// Drops images whose stamp is far from the time at which they were logged, unlike all others, if the message
@@ -71,12 +72,11 @@ std::size_t drop_damaged(const BagSurvey& survey, std::vector<ImageEntry>& image
   return dropped;
 }
 
-ImageList list_of(const BagSurvey& survey, const SurveyedTopic& topic, core::Log& log) {
-  ImageList list;
+TopicImages images_in(const BagSurvey& survey, const SurveyedTopic& topic, core::Log& log) {
+  TopicImages list;
   list.topic = topic.topic;
   list.decoder = topic.decoder;
   list.images = topic.images;
-  list.prefix = fmt::format("{}:{}#", survey.path, topic.topic.name);
 
   const bool stamped = std::any_of(list.images.begin(), list.images.end(),
                                    [](const ImageEntry& entry) { return entry.stamp_ns != 0; });
@@ -94,14 +94,11 @@ ImageList list_of(const BagSurvey& survey, const SurveyedTopic& topic, core::Log
   return list;
 }
 
-std::vector<StampedFile> stamped(const ImageList& list) {
-  std::vector<StampedFile> files;
-  files.reserve(list.images.size());
-  for (std::size_t i = 0; i < list.images.size(); ++i) {
-    const double seconds = seconds_of(list.images[i].stamp_ns);
-    files.push_back({seconds, fmt::format("{}{}", list.prefix, i), 0});
-  }
-  return files;
+std::vector<StampedFile> stamps_of(const TopicImages& list) {
+  std::vector<StampedFile> stamps;
+  stamps.reserve(list.images.size());
+  for (const ImageEntry& entry : list.images) stamps.push_back({seconds_of(entry.stamp_ns), "", 0});
+  return stamps;
 }
 
 core::Result<std::optional<sensor::CameraReading>> camera_of_bag(const BagSurvey& survey,
@@ -142,25 +139,25 @@ core::Result<Layout> read_bag(const std::filesystem::path& path, const TopicName
   layout.format = survey->kind;
   layout.camera = std::move(*camera);
 
-  ImageList color = list_of(*survey, *topics->color.topic, log);
-  ImageList depth = list_of(*survey, *topics->depth.topic, log);
-  const auto color_files = stamped(color);
-  const auto depth_files = stamped(depth);
+  TopicImages color = images_in(*survey, *topics->color.topic, log);
+  TopicImages depth = images_in(*survey, *topics->depth.topic, log);
+  const auto color_stamps = stamps_of(color);
+  const auto depth_stamps = stamps_of(depth);
   const double own_delay_s = layout.camera ? layout.camera->camera.depth_delay_s : 0.0;
   const double delay_s = options.depth_delay_s != 0.0 ? options.depth_delay_s : own_delay_s;
-  layout.pairs = pair_by_stamp(color_files, depth_files, options.max_pair_gap_s, delay_s);
+  layout.pairs = pair_by_stamp(color_stamps, depth_stamps, options.max_pair_gap_s, delay_s);
 
   if (layout.pairs.empty()) {
-    if (color_files.empty() || depth_files.empty())
+    if (color_stamps.empty() || depth_stamps.empty())
       return core::input_error(survey->path + ": no image of colour or depth can be read");
-    return core::input_error(
-        survey->path + ": " +
-        no_common_time(color.topic.name, color_files, depth.topic.name, depth_files, options.max_pair_gap_s));
+    return core::input_error(survey->path + ": " +
+                             no_common_time(color.topic.name, color_stamps, depth.topic.name, depth_stamps,
+                                            options.max_pair_gap_s));
   }
 
   if (layout.camera && survey->camera_yaml.empty()) layout.camera->camera.fps = usual_fps(layout.pairs);
   if (options.body) layout.body = read_bag_body(*survey, *topics, log);
-  layout.images = std::make_shared<BagImages>(survey->files, std::move(color), std::move(depth));
+  layout.images = std::make_shared<BagImages>(*survey, std::move(color), std::move(depth));
   return layout;
 }
 

@@ -8,34 +8,34 @@
 
 namespace plumbline::dataset {
 
-core::Result<cv::Mat> MessageImages::image(const std::string& name) const {
-  const auto place = place_of(name);
-  if (!place) return tl::unexpected(place.error());
+core::Result<cv::Mat> MessageImages::read(ImageId id) {
+  const auto found = message_of(id);
+  if (!found) return tl::unexpected(found.error());
   MessageImage image = tl::unexpected<std::string>("");
-  if (place->raw) {
-    const auto message = place->decoder->image(place->bytes);
+  if (found->raw) {
+    const auto message = found->decoder->image(found->bytes);
     image = message ? image_of(*message) : tl::unexpected(message.error());
   } else {
-    const auto message = place->decoder->compressed_image(place->bytes);
+    const auto message = found->decoder->compressed_image(found->bytes);
     image = message ? image_of(*message) : tl::unexpected(message.error());
   }
   if (image) return std::move(*image);
-  return core::input_error(name + ": " + image.error());
+  return core::input_error(describe(id) + ": " + image.error());
 }
 
-core::Result<StoredImage> MessageImages::stored(const std::string& name) const {
-  const auto place = place_of(name);
-  if (!place) return tl::unexpected(place.error());
+core::Result<StoredImage> MessageImages::stored(ImageId id) {
+  const auto found = message_of(id);
+  if (!found) return tl::unexpected(found.error());
   StoredImage stored;
-  if (!place->raw) {
-    const auto message = place->decoder->compressed_image(place->bytes);
+  if (!found->raw) {
+    const auto message = found->decoder->compressed_image(found->bytes);
     const bool file = message && !is_compressed_depth(message->format);
     if (file && (is_png(message->data) || is_jpeg(message->data))) {
       stored.ending = is_png(message->data) ? ".png" : ".jpg";
       stored.bytes = message->data;
     }
   }
-  auto pixels = stored.bytes.empty() ? image(name) : decode_image(name, stored.bytes);
+  auto pixels = stored.bytes.empty() ? read(id) : decode_image(describe(id), stored.bytes);
   if (!pixels) return tl::unexpected(pixels.error());
   stored.pixels = std::move(*pixels);
   return stored;

@@ -2,26 +2,24 @@
 #pragma once
 
 // Images that are messages, of a bag or of a network.
-#include <string>
-
 #include "bags/messages.hpp"
-#include "layout.hpp"
+#include "images/image_source.hpp"
 
 namespace plumbline::dataset {
 
-class MessageImages : public ImageStore {
+class MessageImages : public ImageSource {
  public:
-  [[nodiscard]] core::Result<cv::Mat> image(const std::string& name) const override;
-  [[nodiscard]] core::Result<StoredImage> stored(const std::string& name) const override;
+  [[nodiscard]] core::Result<cv::Mat> read(ImageId id) override;
+  [[nodiscard]] core::Result<StoredImage> stored(ImageId id) override;
 
  protected:
-  struct Place {
+  struct Message {
     bool raw = true;  ///< sensor_msgs/Image, else CompressedImage
     const MessageDecoder* decoder = nullptr;
     Bytes bytes;
   };
-  /// The message of that name. Error (kInput): there is none, or it cannot be read.
-  [[nodiscard]] virtual core::Result<Place> place_of(const std::string& name) const = 0;
+  /// Error (kInput): there is no such message, or it cannot be read.
+  [[nodiscard]] virtual core::Result<Message> message_of(ImageId id) const = 0;
 };
 
 }  // namespace plumbline::dataset

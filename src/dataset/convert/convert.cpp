@@ -155,14 +155,13 @@ core::Result<void> put_in_place(const fs::path& written, const fs::path& out, bo
 }
 
 /// Refuses images that a link brings into the recording's folder: what lies elsewhere is not the recording's.
-core::Result<void> check_links(const PairInfo& info, const StoredPair& pair) {
-  for (const auto& [file, image] :
-       {std::pair(&info.color_file, &pair.color), std::pair(&info.depth_file, &pair.depth)}) {
+core::Result<void> check_links(const StoredPair& pair) {
+  for (const StoredImage* image : {&pair.color, &pair.depth}) {
     if (!image->linked_out) continue;
     return core::input_error(
         fmt::format("{}: is behind a link that leads out of the recording's folder; put the file itself "
                     "there if it is to be copied",
-                    *file));
+                    image->name));
   }
   return {};
 }
@@ -181,7 +180,7 @@ core::Result<ConvertSummary> copy_frames(const FrameSource& source, CopyTarget& 
     const PairInfo info = source.info(i);
     const auto pair = source.stored(i);
     core::Result<void> added;
-    if (pair) added = check_links(info, *pair);
+    if (pair) added = check_links(*pair);
     if (pair && added) {
       added = target.add(nanoseconds(info.stamp),
                          nanoseconds(info.depth_stamp - source.camera().depth_delay_s), *pair);

@@ -6,7 +6,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
@@ -230,6 +229,7 @@ core::Result<std::unique_ptr<AzureKinectFile>> AzureKinectFile::open(const std::
     return core::input_error(fmt::format("{}: is not an Azure Kinect recording with colour and depth: {}",
                                          file, understood.error().message));
   }
+  opened->list_stamps();
   return opened;
 }
 
@@ -277,17 +277,15 @@ core::Result<void> AzureKinectFile::understand(const ContainerContents& contents
   return {};
 }
 
-AzureKinectFile::Stamps AzureKinectFile::stamps() {
-  const std::lock_guard lock(mutex_);
-  Stamps stamps;
+void AzureKinectFile::list_stamps() {
   ContainerPacket packet;
   demuxer_.seek(container_, color_.number, 0);
   while (demuxer_.next(container_, packet, false)) {
-    if (packet.track == color_.number) stamps.color.push_back(packet.stamp_us);
-    if (packet.track == depth_.number) stamps.depth.push_back(packet.stamp_us);
+    for (Track* track : {&color_, &depth_}) {
+      if (packet.track == track->number) track->stamps.push_back(packet.stamp_us);
+    }
   }
-  at_us_ = -1;
-  return stamps;
+  for (Track* track : {&color_, &depth_}) std::sort(track->stamps.begin(), track->stamps.end());
 }
 
 const ContainerPacket* AzureKinectFile::passed(int track, std::int64_t stamp_us) const {
@@ -340,46 +338,30 @@ core::Result<Bytes> AzureKinectFile::packet_of(const Track& track, std::int64_t 
       fmt::format("{}: the image at {:.6f} s cannot be read", file_, 1e-6 * static_cast<double>(stamp_us)));
 }
 
-core::Result<cv::Mat> AzureKinectFile::color(std::int64_t stamp_us) {
-  auto bytes = packet_of(color_, stamp_us);
+core::Result<cv::Mat> AzureKinectFile::read(ImageId id) {
+  const Track& track = track_of(id);
+  auto bytes = packet_of(track, track.stamps.at(id.number));
   if (!bytes) return tl::unexpected(bytes.error());
   const auto damaged = [&](const std::string& what) {
-    return core::input_error(fmt::format("{}: truncated or damaged: {}", name_of(false, stamp_us), what));
+    return core::input_error(fmt::format("{}: truncated or damaged: {}", describe(id), what));
   };
-  if (color_.info.codec == "mjpeg") {
+
+  if (track.info.codec == "mjpeg") {
     if (!is_jpeg(*bytes)) return damaged("no JPEG");
     Decoded image = decode_jpeg(*bytes);
     if (!image) return damaged(image.error());
     return std::move(*image);
   }
-  cv::Mat image = decode_raw_color(color_.info, *bytes);
+
+  cv::Mat image = id.list == ImageList::kDepth ? decode_b16g(*bytes, track.info.width, track.info.height)
+                                               : decode_raw_color(track.info, *bytes);
   if (image.empty()) return damaged("the packet has another size than the image");
   return image;
 }
 
-core::Result<cv::Mat> AzureKinectFile::depth(std::int64_t stamp_us) {
-  const auto bytes = packet_of(depth_, stamp_us);
-  if (!bytes) return tl::unexpected(bytes.error());
-  cv::Mat image = decode_b16g(*bytes, depth_.info.width, depth_.info.height);
-  if (image.empty()) {
-    return core::input_error(fmt::format(
-        "{}: truncated or damaged: the packet has another size than the image", name_of(true, stamp_us)));
-  }
-  return image;
-}
-
-std::string AzureKinectFile::name_of(bool depth, std::int64_t stamp_us) const {
-  return fmt::format("{}#{}@{}", file_, depth ? "depth" : "color", stamp_us);
-}
-
-std::optional<core::Result<cv::Mat>> AzureKinectFile::read(const std::string& name) {
-  if (name.compare(0, file_.size() + 1, file_ + "#") != 0) return std::nullopt;
-  const std::size_t mark = name.find('@', file_.size());
-  if (mark == std::string::npos) return std::nullopt;
-  std::int64_t stamp = 0;
-  const auto read = std::from_chars(name.data() + mark + 1, name.data() + name.size(), stamp);
-  if (read.ec != std::errc()) return std::nullopt;
-  return name.compare(file_.size() + 1, 5, "depth") == 0 ? depth(stamp) : color(stamp);
+std::string AzureKinectFile::describe(ImageId id) const {
+  return fmt::format("{}#{}@{}", file_, id.list == ImageList::kDepth ? "depth" : "color",
+                     track_of(id).stamps.at(id.number));
 }
 
 }  // namespace plumbline::dataset

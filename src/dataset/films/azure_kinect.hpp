@@ -15,6 +15,7 @@
 
 #include "films/container.hpp"
 #include "images/image_decoders.hpp"
+#include "images/image_source.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/sensor/camera.hpp"
 
@@ -30,40 +31,37 @@ core::Result<sensor::Camera> azure_kinect_camera(const std::string& calibration,
 std::optional<std::pair<int, int>> azure_depth_size(const std::string& depth_mode);
 
 /// One open recording. Read best in order, or nearly so. Thread-safe.
-class AzureKinectFile {
+class AzureKinectFile final : public ImageSource {
  public:
   /// Error (kInput): no recording of an Azure Kinect, or one without colour or depth; names the file.
   static core::Result<std::unique_ptr<AzureKinectFile>> open(const std::string& file);
-  ~AzureKinectFile();
-  AzureKinectFile(const AzureKinectFile&) = delete;
-  AzureKinectFile& operator=(const AzureKinectFile&) = delete;
+  ~AzureKinectFile() override;
 
   [[nodiscard]] const sensor::Camera& camera() const { return camera_; }
   [[nodiscard]] const std::string& depth_mode() const { return depth_mode_; }
   [[nodiscard]] const std::string& color_mode() const { return color_mode_; }
-  /// Stamps, microseconds, of all images of colour and of depth, in the order of the file.
-  struct Stamps {
-    std::vector<std::int64_t> color;
-    std::vector<std::int64_t> depth;
-  };
-  /// Goes through the file once.
-  [[nodiscard]] Stamps stamps();
-  /// The image with a stamp: CV_8UC3 in BGR, or CV_16UC1. Error (kInput): it is not there or damaged.
-  core::Result<cv::Mat> color(std::int64_t stamp_us);
-  core::Result<cv::Mat> depth(std::int64_t stamp_us);
+  /// Stamps of a list's images, microseconds, in order.
+  [[nodiscard]] const std::vector<std::int64_t>& stamps(ImageList list) const {
+    return track_of({list}).stamps;
+  }
 
-  /// "FILE.mkv#depth@33333": the name of an image, used in pairs instead of a file.
-  [[nodiscard]] std::string name_of(bool depth, std::int64_t stamp_us) const;
-  /// The image of such a name; none for names of another kind.
-  std::optional<core::Result<cv::Mat>> read(const std::string& name);
+  /// CV_8UC3 in BGR, or CV_16UC1.
+  [[nodiscard]] core::Result<cv::Mat> read(ImageId id) override;
+  [[nodiscard]] std::string describe(ImageId id) const override;
 
  private:
   struct Track {
     int number = -1;
     ContainerTrack info;
+    std::vector<std::int64_t> stamps{};
   };
   AzureKinectFile(std::string file, const Demuxer& demuxer) : file_(std::move(file)), demuxer_(demuxer) {}
+  [[nodiscard]] const Track& track_of(ImageId id) const {
+    return id.list == ImageList::kColor ? color_ : depth_;
+  }
   core::Result<void> understand(const ContainerContents& contents);
+  /// Goes through the file once.
+  void list_stamps();
   core::Result<Bytes> packet_of(const Track& track, std::int64_t stamp_us);
   [[nodiscard]] const ContainerPacket* passed(int track, std::int64_t stamp_us) const;
   void remember(ContainerPacket packet);

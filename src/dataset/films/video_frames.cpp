@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
-
 #include "plumbline/core/git_lfs.hpp"
 
 namespace plumbline::dataset {
@@ -14,20 +12,6 @@ constexpr std::size_t kRecent = 8;
 constexpr std::int64_t kSkipAtMost = 90;  // frames; beyond, seeking is quicker than decoding
 
 }  // namespace
-
-std::string video_frame_name(const std::string& file, std::int64_t frame) {
-  return fmt::format("{}#{}", file, frame);
-}
-
-std::optional<std::pair<std::string, std::int64_t>> video_frame_of(const std::string& name) {
-  const std::size_t mark = name.rfind('#');
-  if (mark == std::string::npos || mark + 1 == name.size()) return std::nullopt;
-  std::int64_t frame = 0;
-  const char* const end = name.data() + name.size();
-  const auto [stop, problem] = std::from_chars(name.data() + mark + 1, end, frame);
-  if (problem != std::errc() || stop != end || frame < 0) return std::nullopt;
-  return std::pair(name.substr(0, mark), frame);
-}
 
 VideoFrames::VideoFrames(std::string file) : file_(std::move(file)) {}
 

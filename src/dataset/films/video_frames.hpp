@@ -29,11 +29,6 @@ struct VideoDecoder {
   bool (*next)(void* video, cv::Mat& image);  ///< CV_8UC3, BGR
 };
 
-/// "film.mp4#12": the name of a frame, used in pairs instead of a file.
-std::string video_frame_name(const std::string& file, std::int64_t frame);
-/// File and number of such a name; none for names of files.
-std::optional<std::pair<std::string, std::int64_t>> video_frame_of(const std::string& name);
-
 /// One open video. Read best in order, or nearly so. Thread-safe.
 class VideoFrames {
  public:

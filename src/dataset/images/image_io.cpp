@@ -7,9 +7,9 @@
 #include <cerrno>
 #include <fstream>
 
-#include "frame_images.hpp"
 #include "images/image_decoders.hpp"
 #include "images/image_formats.hpp"
+#include "images/image_source.hpp"
 #include "plumbline/core/git_lfs.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/core/shortage.hpp"

@@ -23,24 +23,19 @@ bool looks_like_matroska(const fs::path& file) {
   return stream && magic == std::array<char, 4>{'\x1A', '\x45', '\xDF', '\xA3'};
 }
 
-std::vector<StampedFile> stamped_names(const AzureKinectFile& file, bool depth,
-                                       const std::vector<std::int64_t>& stamps) {
-  std::vector<StampedFile> names;
-  names.reserve(stamps.size());
-  for (const std::int64_t stamp : stamps)
-    names.push_back({1e-6 * static_cast<double>(stamp), file.name_of(depth, stamp), 0});
-  std::stable_sort(names.begin(), names.end(),
-                   [](const StampedFile& a, const StampedFile& b) { return a.stamp < b.stamp; });
-  return names;
+std::vector<StampedFile> stamps_in(const AzureKinectFile& file, ImageList list) {
+  std::vector<StampedFile> stamps;
+  for (const std::int64_t stamp : file.stamps(list))
+    stamps.push_back({1e-6 * static_cast<double>(stamp), "", 0});
+  return stamps;
 }
 
 core::Result<Layout> read_azure_kinect(const fs::path& path, const LayoutOptions& options, core::Log& log) {
   auto file = AzureKinectFile::open(path.string());
   if (!file) return tl::unexpected(file.error());
 
-  const AzureKinectFile::Stamps stamps = (*file)->stamps();
-  const auto color = stamped_names(**file, false, stamps.color);
-  const auto depth = stamped_names(**file, true, stamps.depth);
+  const auto color = stamps_in(**file, ImageList::kColor);
+  const auto depth = stamps_in(**file, ImageList::kDepth);
   Layout layout;
   layout.format = "azure-kinect";
   layout.pairs = pair_by_stamp(color, depth, options.max_pair_gap_s, options.depth_delay_s);
@@ -61,7 +56,7 @@ core::Result<Layout> read_azure_kinect(const fs::path& path, const LayoutOptions
                                (*file)->depth_mode());
   camera.camera = (*file)->camera();
   layout.camera = std::move(camera);
-  layout.packed = std::shared_ptr<AzureKinectFile>(std::move(*file));
+  layout.images = std::move(*file);
   return layout;
 }
 

@@ -61,8 +61,7 @@ std::vector<long long> numbers_of(const std::string& name) {
   return numbers;
 }
 
-std::vector<std::pair<long long, std::string>> numbered_images(const fs::path& folder,
-                                                               const std::string& prefix) {
+NumberedFiles numbered_images(const fs::path& folder, const std::string& prefix) {
   std::vector<fs::path> files;
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(folder, ignored)) {
@@ -78,17 +77,22 @@ std::vector<std::pair<long long, std::string>> numbered_images(const fs::path& f
   return {images.begin(), images.end()};
 }
 
-std::vector<PairInfo> pair_numbered(const std::vector<std::pair<long long, std::string>>& color,
-                                    const std::vector<std::pair<long long, std::string>>& depth, double fps) {
-  const std::map<long long, std::string> partners(depth.begin(), depth.end());
-  std::vector<PairInfo> pairs;
+Layout numbered_layout(const char* format, const NumberedFiles& color, const NumberedFiles& depth,
+                       double fps) {
+  const auto images = std::make_shared<FileImages>();
+  std::map<long long, ImageId> partners;
+  for (const auto& [number, file] : depth) partners[number] = images->add(ImageList::kDepth, file);
+
+  Layout layout{format};
+  layout.images = images;
   for (const auto& [number, file] : color) {
+    const ImageId image = images->add(ImageList::kColor, file);
     const auto partner = partners.find(number);
     if (partner == partners.end()) continue;
     const double stamp = static_cast<double>(number) / fps;
-    pairs.push_back({stamp, stamp, file, partner->second});
+    layout.pairs.push_back({stamp, stamp, image, partner->second});
   }
-  return pairs;
+  return layout;
 }
 
 std::optional<geometry::Rigid3> read_pose_file(const std::string& file) {

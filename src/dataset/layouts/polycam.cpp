@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "layout.hpp"
 #include "plumbline/core/json.hpp"
@@ -89,13 +90,14 @@ core::Result<Layout> read_polycam(const fs::path& folder, const LayoutOptions& /
   const auto depth = numbered_images(keyframes / "depth");
   constexpr double kMicroseconds = 1e6;
 
-  Layout layout{"polycam", {}, std::nullopt};
+  Layout layout = numbered_layout("polycam", color, depth, kMicroseconds);
   geometry::Trajectory poses;
   std::size_t left_out = 0;
   std::string first_problem;
 
-  for (const PairInfo& pair : pair_numbered(color, depth, kMicroseconds)) {
-    const auto frame = read_polycam_camera(cameras / (fs::path(pair.color_file).stem().string() + ".json"));
+  for (const PairInfo& pair : std::exchange(layout.pairs, {})) {
+    const fs::path image = layout.images->file(pair.color);
+    const auto frame = read_polycam_camera(cameras / (image.stem().string() + ".json"));
     if (!frame) {
       if (left_out++ == 0) first_problem = "; the first of them: " + frame.error().message;
       continue;

@@ -87,10 +87,11 @@ core::Result<sensor::CameraReading> record3d_camera(const fs::path& file, const 
 }
 
 /// Adds each frame's own pinhole, if the lens focused and metadata.json has the values.
-void add_record3d_cameras(const json& metadata, const sensor::Pinhole& nominal, Layout& layout) {
+void add_record3d_cameras(const json& metadata, const sensor::Pinhole& nominal, const NumberedFiles& color,
+                          Layout& layout) {
   std::vector<sensor::Pinhole> cameras;
   for (const PairInfo& pair : layout.pairs) {
-    const long long number = numbers_of(fs::path(pair.color_file).stem().string()).front();
+    const long long number = color[pair.color.number].first;
     const auto n = numbers_of_array<4>(element(metadata, "perFrameIntrinsicCoeffs", number));
     if (!n) return;
     sensor::Camera camera;
@@ -112,7 +113,7 @@ core::Result<Layout> read_record3d(const fs::path& folder, const LayoutOptions& 
 
   const auto color = numbered_images(place / "rgb");
   const auto depth = numbered_images(place / "depth");
-  Layout layout{"record3d", pair_numbered(color, depth, camera->camera.fps), std::nullopt};
+  Layout layout = numbered_layout("record3d", color, depth, camera->camera.fps);
   if (layout.pairs.empty()) {
     return core::input_error(fmt::format("{}: no number is in both rgb/ ({} images) and depth/ ({})",
                                          place.string(), color.size(), depth.size()));
@@ -122,7 +123,7 @@ core::Result<Layout> read_record3d(const fs::path& folder, const LayoutOptions& 
   std::size_t without = 0;
 
   for (PairInfo& pair : layout.pairs) {
-    const long long number = numbers_of(fs::path(pair.color_file).stem().string()).front();
+    const long long number = color[pair.color.number].first;
     const json& stamp = element(metadata, "frameTimestamps", number);
     if (stamp.is_number() && std::isfinite(stamp.get<double>()))
       pair.stamp = pair.depth_stamp = stamp.get<double>();
@@ -138,7 +139,7 @@ core::Result<Layout> read_record3d(const fs::path& folder, const LayoutOptions& 
   std::stable_sort(poses.begin(), poses.end(), earlier);
   if (without > 0)
     log.warning(fmt::format("{}: {} frames have no pose there", (place / "metadata.json").string(), without));
-  add_record3d_cameras(metadata, camera->camera.color, layout);
+  add_record3d_cameras(metadata, camera->camera.color, color, layout);
   layout.camera = std::move(*camera);
 
   const fs::path confidence = place / "confidence";

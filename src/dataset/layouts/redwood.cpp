@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "layout.hpp"
 #include "plumbline/core/numbers.hpp"
@@ -18,12 +17,6 @@ namespace fs = std::filesystem;
 
 constexpr double kMicroseconds = 1e-6;
 
-struct NumberedFile {
-  long long number = 0;
-  std::optional<double> stamp;  ///< from names such as 0000012-000000400431.jpg: number, microseconds
-  std::string file;
-};
-
 std::optional<fs::path> color_folder(const fs::path& folder) {
   for (const char* name : {"color", "image", "rgb"}) {
     if (is_folder(folder / name)) return folder / name;
@@ -31,26 +24,15 @@ std::optional<fs::path> color_folder(const fs::path& folder) {
   return std::nullopt;
 }
 
-/// Images with a number in their name, by number; a number seen twice keeps the first name.
-std::map<long long, NumberedFile> list_images(const fs::path& folder) {
-  std::map<long long, NumberedFile> images;
-  for (const auto& [number, file] : numbered_images(folder)) {
-    const std::vector<long long> numbers = numbers_of(fs::path(file).stem().string());
-    NumberedFile image{number, std::nullopt, file};
-    if (numbers.size() == 2) image.stamp = static_cast<double>(numbers[1]) * kMicroseconds;
-    images.emplace(image.number, std::move(image));
-  }
-  return images;
-}
-
-bool all_stamped(const std::map<long long, NumberedFile>& images) {
-  return std::all_of(images.begin(), images.end(), [](const auto& i) { return i.second.stamp.has_value(); });
-}
-
-std::vector<StampedFile> by_stamp(const std::map<long long, NumberedFile>& images) {
+/// Images by the stamps in names such as 0000012-000000400431.jpg: number, microseconds; none if one has no
+/// such name.
+std::optional<std::vector<StampedFile>> by_stamp(const NumberedFiles& images) {
   std::vector<StampedFile> files;
-  files.reserve(images.size());
-  for (const auto& [number, image] : images) files.push_back({*image.stamp, image.file, 0});
+  for (const auto& [number, file] : images) {
+    const std::vector<long long> numbers = numbers_of(fs::path(file).stem().string());
+    if (numbers.size() != 2) return std::nullopt;
+    files.push_back({static_cast<double>(numbers[1]) * kMicroseconds, file, 0});
+  }
   std::sort(files.begin(), files.end(), kByStamp);
   return files;
 }
@@ -92,18 +74,6 @@ geometry::Trajectory read_log(const fs::path& file, const std::vector<PairInfo>&
   return truth;
 }
 
-std::vector<PairInfo> pair_by_number(const std::map<long long, NumberedFile>& color,
-                                     const std::map<long long, NumberedFile>& depth, double fps) {
-  std::vector<PairInfo> pairs;
-  for (const auto& [number, image] : color) {
-    const auto partner = depth.find(number);
-    if (partner == depth.end()) continue;
-    const double stamp = static_cast<double>(number) / fps;
-    pairs.push_back({stamp, stamp, image.file, partner->second.file});
-  }
-  return pairs;
-}
-
 bool looks_like_redwood(const fs::path& folder) {
   return color_folder(folder) && is_folder(folder / "depth");
 }
@@ -116,8 +86,8 @@ core::Result<Layout> read_redwood(const fs::path& folder, const LayoutOptions& o
         folder.string(), colors ? "depth/" : "colour"));
   }
 
-  const auto color = list_images(*colors);
-  const auto depth = list_images(folder / "depth");
+  const auto color = numbered_images(*colors);
+  const auto depth = numbered_images(folder / "depth");
   for (const auto& [images, path] : {std::pair(&color, *colors), std::pair(&depth, folder / "depth")}) {
     if (images->empty()) {
       return core::input_error(
@@ -125,25 +95,24 @@ core::Result<Layout> read_redwood(const fs::path& folder, const LayoutOptions& o
     }
   }
 
-  Layout layout{"redwood", {}, std::nullopt};
-  if (all_stamped(color) && all_stamped(depth)) {
-    const auto c = by_stamp(color);
-    const auto d = by_stamp(depth);
-    layout.pairs = pair_by_stamp(c, d, options.max_pair_gap_s);
+  Layout layout = numbered_layout("redwood", color, depth, options.fps);
+  const auto c = by_stamp(color);
+  const auto d = by_stamp(depth);
+  if (c && d) {
+    layout.pairs = pair_by_stamp(*c, *d, options.max_pair_gap_s);
+    layout.images = images_of(*c, *d);
     if (layout.pairs.empty()) {
       return core::input_error(
-          no_common_time(colors->string(), c, (folder / "depth").string(), d, options.max_pair_gap_s));
+          no_common_time(colors->string(), *c, (folder / "depth").string(), *d, options.max_pair_gap_s));
     }
-  } else {
-    layout.pairs = pair_by_number(color, depth, options.fps);
   }
 
   if (layout.pairs.empty()) {
     return core::input_error(
         fmt::format("{}: no number is in both {}/ ({} to {}) and depth/ ({} to {}); colour and depth are "
                     "matched by number",
-                    folder.string(), colors->filename().string(), color.begin()->first, color.rbegin()->first,
-                    depth.begin()->first, depth.rbegin()->first));
+                    folder.string(), colors->filename().string(), color.front().first, color.back().first,
+                    depth.front().first, depth.back().first));
   }
 
   const std::size_t unmatched = color.size() + depth.size() - 2 * layout.pairs.size();

@@ -33,7 +33,7 @@ std::optional<geometry::Trajectory> replica_truth(const fs::path& file, double f
 core::Result<Layout> read_replica(const fs::path& folder, const LayoutOptions& options, core::Log& log) {
   const auto color = numbered_images(folder / "results", "frame");
   const auto depth = numbered_images(folder / "results", "depth");
-  Layout layout{"replica", pair_numbered(color, depth, options.fps), std::nullopt};
+  Layout layout = numbered_layout("replica", color, depth, options.fps);
   if (layout.pairs.empty()) {
     return core::input_error(
         fmt::format("{}: no number is in both names, frame000000.jpg ({} of these) and depth000000.png ({})",

@@ -16,13 +16,12 @@ bool looks_like_scannet(const fs::path& folder) {
          is_file(folder / "intrinsic" / "intrinsic_color.txt");
 }
 
-geometry::Trajectory scannet_truth(const fs::path& folder, const std::vector<PairInfo>& pairs,
-                                   core::Log& log) {
+geometry::Trajectory scannet_truth(const fs::path& folder, const Layout& layout, core::Log& log) {
   geometry::Trajectory truth;
   std::size_t left_out = 0;
 
-  for (const PairInfo& pair : pairs) {
-    const fs::path file = folder / "pose" / (fs::path(pair.color_file).stem().string() + ".txt");
+  for (const PairInfo& pair : layout.pairs) {
+    const fs::path file = folder / "pose" / (layout.images->file(pair.color).stem().string() + ".txt");
     if (!is_file(file)) continue;
     if (const auto pose = read_pose_file(file.string())) {
       truth.push_back({pair.stamp, *pose});
@@ -43,7 +42,7 @@ geometry::Trajectory scannet_truth(const fs::path& folder, const std::vector<Pai
 core::Result<Layout> read_scannet(const fs::path& folder, const LayoutOptions& options, core::Log& log) {
   const auto color = numbered_images(folder / "color");
   const auto depth = numbered_images(folder / "depth");
-  Layout layout{"scannet", pair_numbered(color, depth, options.fps), std::nullopt};
+  Layout layout = numbered_layout("scannet", color, depth, options.fps);
   if (layout.pairs.empty()) {
     return core::input_error(fmt::format("{}: no number is in both color/ ({} images) and depth/ ({})",
                                          folder.string(), color.size(), depth.size()));
@@ -51,7 +50,7 @@ core::Result<Layout> read_scannet(const fs::path& folder, const LayoutOptions& o
   const std::size_t unmatched = color.size() + depth.size() - 2 * layout.pairs.size();
   if (unmatched > 0)
     log.warning(fmt::format("{}: {} images have no partner and are skipped", folder.string(), unmatched));
-  geometry::Trajectory truth = scannet_truth(folder, layout.pairs, log);
+  geometry::Trajectory truth = scannet_truth(folder, layout, log);
   if (!truth.empty()) layout.truth = std::move(truth);
   return layout;
 }

@@ -59,7 +59,8 @@ bool looks_like_seven_scenes(const fs::path& folder) {
 }
 
 core::Result<Layout> read_seven_scenes(const fs::path& folder, const LayoutOptions& options, core::Log& log) {
-  Layout layout{"7scenes", {}, std::nullopt};
+  Layout layout{"7scenes"};
+  const auto images = std::make_shared<FileImages>();
   geometry::Trajectory truth;
   std::size_t incomplete = 0;
 
@@ -69,7 +70,8 @@ core::Result<Layout> read_seven_scenes(const fs::path& folder, const LayoutOptio
       continue;
     }
     const double stamp = number / options.fps;
-    layout.pairs.push_back({stamp, stamp, files.color, files.depth});
+    layout.pairs.push_back({stamp, stamp, images->add(ImageList::kColor, files.color),
+                            images->add(ImageList::kDepth, files.depth)});
     if (files.pose.empty()) continue;
     if (const auto pose = read_pose_file(files.pose)) truth.push_back({stamp, *pose});
   }
@@ -86,6 +88,7 @@ core::Result<Layout> read_seven_scenes(const fs::path& folder, const LayoutOptio
         fmt::format("{}: {} frames lack colour or depth and are skipped", folder.string(), incomplete));
   }
 
+  layout.images = images;
   if (!truth.empty()) layout.truth = std::move(truth);
   return layout;
 }

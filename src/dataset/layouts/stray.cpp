@@ -4,7 +4,7 @@
 // camera_matrix.csv for the video.
 #include <fmt/format.h>
 
-#include "films/video_frames.hpp"
+#include "films/film_images.hpp"
 #include "layout.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 
@@ -28,7 +28,8 @@ core::Result<Layout> read_stray(const fs::path& folder, const LayoutOptions& /*o
 
   Layout layout;
   layout.format = "stray";
-  layout.video = film;
+  const auto images = std::make_shared<FilmImages>(film);
+  layout.images = images;
   const fs::path confidence = folder / "confidence";
   if (is_folder(confidence)) layout.confidence = confidence.string();
 
@@ -36,7 +37,8 @@ core::Result<Layout> read_stray(const fs::path& folder, const LayoutOptions& /*o
   for (const auto& [number, file] : numbered_images(folder / "depth")) {
     if (number >= rows || number >= *frames) continue;
     const double stamp = odometry->rows[static_cast<std::size_t>(number)];
-    layout.pairs.push_back({stamp, stamp, video_frame_name(film, number), file});
+    const ImageId color{ImageList::kColor, static_cast<std::size_t>(number)};
+    layout.pairs.push_back({stamp, stamp, color, images->add(ImageList::kDepth, file)});
   }
 
   if (layout.pairs.empty()) {

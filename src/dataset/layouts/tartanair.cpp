@@ -77,7 +77,7 @@ sensor::CameraReading tartanair_camera() {
 core::Result<Layout> read_tartanair(const fs::path& folder, const LayoutOptions& options, core::Log& log) {
   const auto color = numbered_images(folder / "image_left");
   const auto depth = numbered_images(folder / "depth_left");
-  Layout layout{"tartanair", pair_numbered(color, depth, options.fps), std::nullopt};
+  Layout layout = numbered_layout("tartanair", color, depth, options.fps);
   if (layout.pairs.empty()) {
     return core::input_error(
         fmt::format("{}: no number is in both image_left/ ({} images) and depth_left/ ({})", folder.string(),

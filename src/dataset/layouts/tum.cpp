@@ -84,8 +84,7 @@ core::Result<std::vector<StampedFile>> read_list(const fs::path& list, core::Log
   return files;
 }
 
-core::Result<std::vector<PairInfo>> read_two_lists(const fs::path& folder, const LayoutOptions& options,
-                                                   core::Log& log) {
+core::Result<Layout> read_two_lists(const fs::path& folder, const LayoutOptions& options, core::Log& log) {
   for (const char* name : {"rgb.txt", "depth.txt"}) {
     if (is_file(folder / name)) continue;
     return core::input_error(
@@ -96,12 +95,14 @@ core::Result<std::vector<PairInfo>> read_two_lists(const fs::path& folder, const
   if (!color) return tl::unexpected(color.error());
   auto depth = read_list(folder / "depth.txt", log);
   if (!depth) return tl::unexpected(depth.error());
-  std::vector<PairInfo> pairs = pair_by_stamp(*color, *depth, options.max_pair_gap_s, options.depth_delay_s);
-  if (pairs.empty()) {
+  Layout layout{"tum"};
+  layout.pairs = pair_by_stamp(*color, *depth, options.max_pair_gap_s, options.depth_delay_s);
+  layout.images = images_of(*color, *depth);
+  if (layout.pairs.empty()) {
     return core::input_error(no_common_time((folder / "rgb.txt").string(), *color,
                                             (folder / "depth.txt").string(), *depth, options.max_pair_gap_s));
   }
-  return pairs;
+  return layout;
 }
 
 /// True if the first file of a line of four words is the depth image. TUM's own tool writes colour first; the
@@ -118,7 +119,7 @@ bool depth_first(const std::string& first, const std::string& second) {
 }
 
 /// "stamp file stamp file" per line. Every image is used once; the pairs are trusted, however far apart.
-core::Result<std::vector<PairInfo>> read_associations(const fs::path& list, core::Log& log) {
+core::Result<Layout> read_associations(const fs::path& list, core::Log& log) {
   if (auto plain = no_decimal_comma(list); !plain) return tl::unexpected(plain.error());
   auto lines = read_lines(list);
   if (!lines) return tl::unexpected(lines.error());
@@ -157,17 +158,17 @@ core::Result<std::vector<PairInfo>> read_associations(const fs::path& list, core
     if (auto there = check_files(list.string(), *files); !there) return tl::unexpected(there.error());
   }
 
-  std::vector<PairInfo> pairs;
-  for (std::size_t i = 0; i < color.size(); ++i) {
-    pairs.push_back({color[i].stamp, depth[i].stamp, color[i].file, depth[i].file});
-  }
+  Layout layout{"tum"};
+  layout.images = images_of(color, depth);
+  std::vector<PairInfo>& pairs = layout.pairs;
+  for (std::size_t i = 0; i < color.size(); ++i)
+    pairs.push_back({color[i].stamp, depth[i].stamp, {ImageList::kColor, i}, {ImageList::kDepth, i}});
 
   if (!std::is_sorted(pairs.begin(), pairs.end(), kByStamp)) {
     log.warning(fmt::format("{}: the stamps are not in order; sorted", list.string()));
     std::stable_sort(pairs.begin(), pairs.end(), kByStamp);
   }
-
-  return pairs;
+  return layout;
 }
 
 bool looks_like_tum(const fs::path& folder) {
@@ -176,16 +177,15 @@ bool looks_like_tum(const fs::path& folder) {
 
 core::Result<Layout> read_tum(const fs::path& folder, const LayoutOptions& options, core::Log& log) {
   const fs::path associations = folder / "associations.txt";
-  auto pairs =
+  auto layout =
       is_file(associations) ? read_associations(associations, log) : read_two_lists(folder, options, log);
-  if (!pairs) return tl::unexpected(pairs.error());
-  Layout layout{"tum", std::move(*pairs), std::nullopt};
+  if (!layout) return layout;
   if (is_file(folder / "groundtruth.txt")) {
     std::vector<std::string> notes;
     auto truth = read_trajectory(folder / "groundtruth.txt", &notes);
     for (const std::string& note : notes) log.warning(note);
     if (truth) {
-      layout.truth = std::move(*truth);
+      layout->truth = std::move(*truth);
     } else {
       log.warning(truth.error().message + "; the recording is used without truth");
     }

@@ -53,9 +53,9 @@ class LiveSource final : public FrameSource, public BodySource {
 
   [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override {
     const PairInfo pair = info(index);
-    auto color = read_color(live_->layout, pair.color_file, camera_.color);
+    auto color = read_color(live_->layout, pair.color, camera_.color);
     if (!color) return tl::unexpected(color.error());
-    auto depth = read_depth(live_->layout, pair.depth_file, camera_.depth ? *camera_.depth : camera_.color,
+    auto depth = read_depth(live_->layout, pair.depth, camera_.depth ? *camera_.depth : camera_.color,
                             camera_.depth_scale);
     if (!depth) return tl::unexpected(depth.error());
     return rectified_frame(index, pair, *color, *depth, rectifier_);

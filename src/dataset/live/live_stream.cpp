@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <utility>
 
@@ -29,8 +28,6 @@ LiveStream::LiveStream(std::unique_ptr<MessageStream> stream, LiveTopic color, L
     : stream_(std::move(stream)),
       color_(std::move(color)),
       depth_(std::move(depth)),
-      color_prefix_(fmt::format("{}:{}#", options.address, color_.topic.name)),
-      depth_prefix_(fmt::format("{}:{}#", options.address, depth_.topic.name)),
       options_(std::move(options)),
       log_(log),
       pairs_(options_.max_pair_gap_s, options_.depth_delay_s),
@@ -98,8 +95,7 @@ void LiveStream::number(const StampPairs::Pair& pair) {
   last_taken_ = SteadyClock::now();
   const std::size_t index = infos_.size();
   if (index == 0) first_taken_ = last_taken_;
-  info.color_file = fmt::format("{}{}", color_prefix_, index);
-  info.depth_file = fmt::format("{}{}", depth_prefix_, index);
+  info.color.number = info.depth.number = index;
 
   infos_.push_back(std::move(info));
   frames_[index] = {{pair.color.bytes, {}}, {pair.depth.bytes, {}}};
@@ -225,32 +221,26 @@ void LiveStream::keep(std::size_t index) {
   }
 }
 
-core::Result<LiveStream::Place> LiveStream::place_of(const std::string& name) const {
-  for (const bool color : {true, false}) {
-    const std::string& prefix = color ? color_prefix_ : depth_prefix_;
-    if (name.compare(0, prefix.size(), prefix) != 0) continue;
+std::string LiveStream::describe(ImageId id) const {
+  return fmt::format("{}:{}#{}", options_.address, topic_of(id).topic.name, id.number);
+}
 
-    std::size_t number = 0;
-    std::from_chars(name.data() + prefix.size(), name.data() + name.size(), number);
-    const LiveTopic& topic = color ? color_ : depth_;
-    Place place{topic.topic.type == "sensor_msgs/Image", topic.decoder, {}};
-    const std::lock_guard lock(mutex_);
-    const auto frame = frames_.find(number);
-    if (frame == frames_.end()) break;
-
-    const Image& image = color ? frame->second.color : frame->second.depth;
-    if (image.bytes) {
-      place.bytes = *image.bytes;
-      return place;
-    }
-
-    auto kept = image.spot ? kept_.read(*image.spot) : std::nullopt;
-    if (!kept) break;
-    place.bytes = std::move(*kept);
-    return place;
+core::Result<LiveStream::Message> LiveStream::message_of(ImageId id) const {
+  const LiveTopic& topic = topic_of(id);
+  Message message{topic.topic.type == "sensor_msgs/Image", topic.decoder, {}};
+  const std::lock_guard lock(mutex_);
+  const auto frame = frames_.find(id.number);
+  const Image* image = frame == frames_.end()         ? nullptr
+                       : id.list == ImageList::kColor ? &frame->second.color
+                                                      : &frame->second.depth;
+  if (image != nullptr && image->bytes) {
+    message.bytes = *image->bytes;
+    return message;
   }
-
-  return core::input_error(name + ": has gone by");
+  auto kept = image != nullptr && image->spot ? kept_.read(*image->spot) : std::nullopt;
+  if (!kept) return core::input_error(describe(id) + ": has gone by");
+  message.bytes = std::move(*kept);
+  return message;
 }
 
 LiveCounts LiveStream::counts() const {

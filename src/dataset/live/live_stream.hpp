@@ -75,6 +75,7 @@ class LiveStream final : public MessageImages {
   [[nodiscard]] bool decided(std::size_t index);
   void wait_for(std::size_t index, std::chrono::milliseconds most);
   void keep(std::size_t index);
+  [[nodiscard]] std::string describe(ImageId id) const override;
   [[nodiscard]] LiveCounts counts() const;
   /// As FrameSource's; the frame that odometry is about is "" as long as there is none.
   [[nodiscard]] BodyReadings body_readings(double imu_after, double odometry_after, double until) const;
@@ -95,7 +96,10 @@ class LiveStream final : public MessageImages {
     }
   };
 
-  [[nodiscard]] core::Result<Place> place_of(const std::string& name) const override;
+  [[nodiscard]] core::Result<Message> message_of(ImageId id) const override;
+  [[nodiscard]] const LiveTopic& topic_of(ImageId id) const {
+    return id.list == ImageList::kColor ? color_ : depth_;
+  }
   void work(const core::StopToken& enough);
   void take(const LiveMessage& message);
   void number(const StampPairs::Pair& pair);
@@ -105,8 +109,6 @@ class LiveStream final : public MessageImages {
   std::unique_ptr<MessageStream> stream_;
   const LiveTopic color_;
   const LiveTopic depth_;
-  const std::string color_prefix_;
-  const std::string depth_prefix_;
   const Options options_;
   core::Log& log_;
   StampPairs pairs_;  ///< used by the thread only

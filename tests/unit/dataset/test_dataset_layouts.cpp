@@ -83,7 +83,7 @@ TEST_F(Redwood, MatchesByNumber) {
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_EQ((*source)->format(), "redwood");
   ASSERT_EQ((*source)->size(), 10U);
-  EXPECT_THAT((*source)->info(9).color_file, HasSubstr("12.jpg"));  // by number, not by name
+  EXPECT_THAT((*source)->stored(9)->color.name, HasSubstr("12.jpg"));  // by number, not by name
   EXPECT_FLOAT_EQ((*source)->read(9)->depth.at<float>(0, 0), 2.012F);
   EXPECT_DOUBLE_EQ((*source)->info(9).stamp, 1.2);
   EXPECT_THAT(log_.warnings, HasSubstr("2 images have no partner"));
@@ -194,8 +194,8 @@ TEST_F(ScanNet, TwoSizesTwoCalibrationsAndNumbersWithoutZeros) {
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_EQ((*source)->format(), "scannet");
   ASSERT_EQ((*source)->size(), 12U);
-  EXPECT_THAT((*source)->info(2).color_file, HasSubstr("color/2.jpg"));
-  EXPECT_THAT((*source)->info(11).depth_file, HasSubstr("depth/11.png"));
+  EXPECT_THAT((*source)->stored(2)->color.name, HasSubstr("color/2.jpg"));
+  EXPECT_THAT((*source)->stored(11)->depth.name, HasSubstr("depth/11.png"));
   const sensor::Camera& camera = (*source)->camera();
   EXPECT_EQ(camera.color.width, 512);
   EXPECT_DOUBLE_EQ(camera.color.fx, 416.0);
@@ -377,7 +377,7 @@ TEST_F(Detection, FramesWithOneStampAreDropped) {
   const auto source = open();
   ASSERT_TRUE(source) << source.error().message;
   ASSERT_EQ((*source)->size(), 3U);
-  EXPECT_THAT((*source)->info(1).color_file, HasSubstr("1.png"));
+  EXPECT_THAT((*source)->stored(1)->color.name, HasSubstr("1.png"));
   EXPECT_THAT(log_.warnings, AllOf(HasSubstr("1 of 4 frames"), HasSubstr("100.100000"), HasSubstr("2.png")));
 }
 

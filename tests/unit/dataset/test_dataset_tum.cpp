@@ -49,7 +49,7 @@ TEST_F(Tum, CarriageReturnsCommentsBlanksAndDisorder) {
   ASSERT_TRUE(source) << source.error().message;
   ASSERT_EQ((*source)->size(), 3U);
   for (std::size_t i = 0; i < 3; ++i) {
-    EXPECT_THAT((*source)->info(i).color_file, HasSubstr("rgb/" + std::to_string(i) + ".png"));
+    EXPECT_THAT((*source)->stored(i)->color.name, HasSubstr("rgb/" + std::to_string(i) + ".png"));
     EXPECT_TRUE((*source)->read(i));
   }
   EXPECT_THAT(log_.warnings, AllOf(HasSubstr("not in order"), HasSubstr("repeat a stamp")));
@@ -79,8 +79,8 @@ TEST_F(Tum, PairsByWhenDepthWasTaken) {
   const auto source = open();
   ASSERT_TRUE(source) << source.error().message;
   ASSERT_EQ((*source)->size(), 2U);
-  EXPECT_THAT((*source)->info(0).color_file, HasSubstr("rgb/1.png"));
-  EXPECT_THAT((*source)->info(0).depth_file, HasSubstr("depth/0.png"));
+  EXPECT_THAT((*source)->stored(0)->color.name, HasSubstr("rgb/1.png"));
+  EXPECT_THAT((*source)->stored(0)->depth.name, HasSubstr("depth/0.png"));
   EXPECT_NEAR((*source)->info(0).depth_stamp, 100.031, 1e-9);
   EXPECT_NEAR((*source)->read(0)->depth_stamp, 100.031, 1e-9);
   // Listed pairs stay what they are.
@@ -96,7 +96,7 @@ TEST_F(Tum, AssociationsInEitherOrder) {
   ASSERT_TRUE(source) << source.error().message;
   ASSERT_EQ((*source)->size(), 2U);
   EXPECT_EQ((*source)->info(0).stamp, 100.001);
-  EXPECT_THAT((*source)->info(0).color_file, HasSubstr("rgb/0.png"));
+  EXPECT_THAT((*source)->stored(0)->color.name, HasSubstr("rgb/0.png"));
   // colour first, an image named twice, stamps in disorder
   write_text("associations.txt",
              "100.1 rgb/1.png 100.1 depth/1.png\r\n100.0 rgb/0.png 100.0 depth/0.png\n"
@@ -104,7 +104,7 @@ TEST_F(Tum, AssociationsInEitherOrder) {
   source = open();
   ASSERT_TRUE(source) << source.error().message;
   ASSERT_EQ((*source)->size(), 2U);
-  EXPECT_THAT((*source)->info(0).color_file, HasSubstr("rgb/0.png"));
+  EXPECT_THAT((*source)->stored(0)->color.name, HasSubstr("rgb/0.png"));
   EXPECT_TRUE((*source)->read(1));
   EXPECT_THAT(log_.warnings, AllOf(HasSubstr("second time"), HasSubstr("not in order")));
 }
@@ -144,7 +144,7 @@ TEST_F(Tum, FramesWithoutFilesAreLeftOutAndCounted) {
   ASSERT_EQ((*source)->size(), 12U);
   EXPECT_EQ((*source)->missing(), 8U);
   EXPECT_THAT(log_.warnings, AllOf(HasSubstr("8 of 20 frames are missing"), HasSubstr("rgb/0.png")));
-  EXPECT_THAT((*source)->info(4).color_file, HasSubstr("rgb/6.png"));
+  EXPECT_THAT((*source)->stored(4)->color.name, HasSubstr("rgb/6.png"));
   for (std::size_t i = 0; i < 12; ++i) {
     const auto frame = (*source)->read(i);
     ASSERT_TRUE(frame) << frame.error().message;
@@ -162,8 +162,8 @@ TEST_F(Tum, APartIsOneOfAllListedFrames) {
   const auto source = open(options);
   ASSERT_TRUE(source) << source.error().message;
   ASSERT_EQ((*source)->size(), 3U);  // of 0.2, 0.4, 0.6 and 0.8 s after the first that is listed
-  EXPECT_THAT((*source)->info(0).color_file, HasSubstr("rgb/2.png"));
-  EXPECT_THAT((*source)->info(1).color_file, HasSubstr("rgb/6.png"));
+  EXPECT_THAT((*source)->stored(0)->color.name, HasSubstr("rgb/2.png"));
+  EXPECT_THAT((*source)->stored(1)->color.name, HasSubstr("rgb/6.png"));
   EXPECT_EQ((*source)->missing(), 1U);
   options.to_s = 0.15;
   options.from_s = 0.0;
