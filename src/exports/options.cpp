@@ -60,8 +60,9 @@ void ExportOptions::declare(core::OptionTable& table) {
   table.text("without", without,
              "Layers that a plan leaves out: wall, patt, assm, door, glaz, area, furn, dims, grid, anno, "
              "path; none");
-  table.numbers("body", body, 0, {-1e4, 1e4}, "",
-                "Pose of the camera in the body, x,y,z,qx,qy,qz,qw, to write the path of the body");
+  table.text("body", body,
+             "Write the path of a body that carries the camera: the camera's pose in it, x,y,z,qx,qy,qz,qw; "
+             "or base: the base of the recording's /tf and odometry");
 }
 
 }  // namespace plumbline::exports

@@ -43,8 +43,9 @@ struct ExportOptions {
   std::string decimal = "point";             ///< or "comma"
   std::string without = "path";              ///< layers that are left out, separated by commas
   // Paths.
-  /// Pose x y z qx qy qz qw of the camera in the body; empty: the camera's own path.
-  std::vector<double> body;
+  /// Pose "x,y,z,qx,qy,qz,qw" of the camera in the body; "base": that of the recording's base; "": the
+  /// camera's own path.
+  std::string body;
 
   /// `table` refers to this object.
   void declare(core::OptionTable& table);

@@ -88,11 +88,8 @@ void note_unknown(std::size_t unknown, std::size_t poses, bool any, ExportSummar
 core::Result<ExportSummary> write_poses(MapSource& source, const std::filesystem::path& output) {
   const auto store = source.store("the covariance of poses");
   if (!store) return tl::unexpected(store.error());
-  const auto body_from_camera = body_from_camera_of(source.options());
-  if (!body_from_camera) return tl::unexpected(body_from_camera.error());
-
-  // Poses of the body that carries the camera
-  const geometry::Rigid3 camera_from_body = body_from_camera->inverse();
+  const auto mounts = body_mounts(source);
+  if (!mounts) return tl::unexpected(mounts.error());
   const auto poses = source.poses(source.request().content == Content::kKeyframes);
   if (!poses) return tl::unexpected(poses.error());
 
@@ -106,6 +103,7 @@ core::Result<ExportSummary> write_poses(MapSource& source, const std::filesystem
   std::size_t unknown = 0;
   for (std::size_t i = 0; i < poses->size(); ++i) {
     const ExportPose& pose = (*poses)[i];
+    const geometry::Rigid3 camera_from_body = mounts->of(pose.robot).inverse();
     const bool known = !covariances.empty() && covariances[i].allFinite();
     unknown += known ? 0 : 1;
     out.write(pose_columns(pose, camera_from_body));

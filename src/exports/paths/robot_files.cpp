@@ -4,34 +4,76 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstdlib>
+#include <sstream>
 
 #include "plumbline/core/text.hpp"
+#include "source/pictures.hpp"
 
 namespace plumbline::exports {
 
-/// The camera's pose in the body of --body; the identity without it.
-core::Result<geometry::Rigid3> body_from_camera_of(const ExportOptions& options) {
-  const std::vector<double>& body = options.body;
-  if (body.empty()) return geometry::Rigid3{};
-  if (body.size() != 7) return core::usage_error("--body: takes x,y,z,qx,qy,qz,qw of the camera in the body");
+namespace {
+
+/// The pose "x,y,z,qx,qy,qz,qw". Errors (kUsage): not a pose.
+core::Result<geometry::Rigid3> pose_of_text(const std::string& text) {
+  std::istringstream in(text);
+  std::vector<double> body;
+  for (std::string word; std::getline(in, word, ',');) {
+    char* end = nullptr;
+    body.push_back(std::strtod(word.c_str(), &end));
+    if (word.empty() || *end != '\0' || !(std::abs(body.back()) < 1e4)) body.clear();
+  }
+  if (body.size() != 7) {
+    return core::usage_error(
+        fmt::format("--body {}: takes x,y,z,qx,qy,qz,qw of the camera in the body, or base", text));
+  }
+
   const Eigen::Quaterniond turn(body[6], body[3], body[4], body[5]);
   if (std::abs(turn.norm() - 1.0) > 0.01)
     return core::usage_error("--body: qx,qy,qz,qw are not a rotation: their squares must add up to 1");
   return geometry::Rigid3(turn, {body[0], body[1], body[2]});
 }
 
+}  // namespace
+
+core::Result<BodyMounts> body_mounts(const MapSource& source) {
+  const std::string& body = source.options().body;
+  BodyMounts mounts;
+  if (body.empty()) return mounts;
+  if (body != "base") {
+    const auto pose = pose_of_text(body);
+    if (!pose) return tl::unexpected(pose.error());
+    mounts.of_all = *pose;
+    return mounts;
+  }
+
+  // The recordings know how their cameras are mounted
+  const auto pictures = Pictures::open_recordings(source);
+  if (!pictures) return tl::unexpected(pictures.error());
+  for (const std::int32_t robot : pictures->robots()) {
+    const auto mount = pictures->body_from_camera(robot);
+    if (!mount) {
+      return core::input_error(
+          "--body base: the recording does not say where its base is: it needs odometry and /tf_static from "
+          "the base to the camera; give the camera's pose x,y,z,qx,qy,qz,qw instead");
+    }
+    mounts.by_robot.emplace(robot, *mount);
+  }
+  return mounts;
+}
+
 /// Selected paths of camera or body, one for each robot.
 core::Result<std::vector<std::vector<ExportPose>>> paths_of(const MapSource& source) {
-  const auto body_from_camera = body_from_camera_of(source.options());
-  if (!body_from_camera) return tl::unexpected(body_from_camera.error());
+  const auto mounts = body_mounts(source);
+  if (!mounts) return tl::unexpected(mounts.error());
   auto poses = source.poses(source.request().content == Content::kKeyframes);
   if (!poses) return tl::unexpected(poses.error());
 
   // Poses are sorted by robot
-  const geometry::Rigid3 camera_from_body = body_from_camera->inverse();
   std::vector<std::vector<ExportPose>> paths;
   for (ExportPose& pose : *poses) {
-    if (!source.options().body.empty()) pose.world_from_camera = pose.world_from_camera * camera_from_body;
+    if (!source.options().body.empty())
+      pose.world_from_camera = pose.world_from_camera * mounts->of(pose.robot).inverse();
     if (paths.empty() || paths.back().back().robot != pose.robot) paths.emplace_back();
     paths.back().push_back(pose);
   }

@@ -10,6 +10,7 @@
 
 #include "plumbline/core/config.hpp"
 #include "plumbline/core/text.hpp"
+#include "plumbline/dataset/body_readings.hpp"
 #include "plumbline/dataset/jpeg.hpp"
 #include "plumbline/exports/recordings.hpp"
 
@@ -205,6 +206,23 @@ core::Result<Pictures> Pictures::open_recordings(const MapSource& source) {
   }
 
   return pictures;
+}
+
+std::vector<std::int32_t> Pictures::robots() const {
+  std::vector<std::int32_t> numbers;
+  for (const auto& [robot, recording] : by_robot_) numbers.push_back(robot);
+  return numbers;
+}
+
+std::optional<geometry::Rigid3> Pictures::body_from_camera(std::int32_t robot) const {
+  const auto found = by_robot_.find(robot);
+  if (found == by_robot_.end()) return std::nullopt;
+  const auto* body = dynamic_cast<const dataset::BodySource*>(found->second.given.get());
+  if (body == nullptr) return std::nullopt;
+
+  // The mount is known whether or not anything was measured in this time
+  constexpr double kAnyTime_s = 1e300;
+  return body->body_readings(kAnyTime_s, kAnyTime_s, kAnyTime_s).body_from_camera;
 }
 
 /// The frame with this stamp, which text files may have rounded.

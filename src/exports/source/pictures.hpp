@@ -21,6 +21,12 @@ class Pictures {
   /// long as the source lives. Errors (kInput): there are no pictures.
   static core::Result<Pictures> open(const MapSource& source);
 
+  /// The recordings alone, as open() does. Errors (kInput): none is known, or one cannot be opened.
+  static core::Result<Pictures> open_recordings(const MapSource& source);
+
+  [[nodiscard]] std::vector<std::int32_t> robots() const;
+  /// Pose of a robot's camera in its base, as its recording tells; none: it does not.
+  [[nodiscard]] std::optional<geometry::Rigid3> body_from_camera(std::int32_t robot) const;
   /// Number of the frame with this stamp in the robot's recording; none: there is no such frame.
   [[nodiscard]] std::optional<std::size_t> find(std::int32_t robot, double stamp) const;
   /// The store's pictures have colour only. Errors (kInput): cannot be read.
@@ -29,7 +35,6 @@ class Pictures {
   [[nodiscard]] bool stored() const { return reader_ != nullptr; }
 
  private:
-  static core::Result<Pictures> open_recordings(const MapSource& source);
   static Pictures open_stored(const maps::StoredRun& store);
 
   struct Recording {

@@ -77,6 +77,11 @@ TEST_F(Exports, AllPathsAreOneAndRunsWriteTheirExports) {
       (*body)[3].world_from_camera.translation - (*tum)[3].world_from_camera * Eigen::Vector3d(0, 0, -0.1);
   EXPECT_LT(off.norm(), 1e-6);
 
+  const Outcome unknown = run("export out -o base.txt --what trajectory --body base");
+  EXPECT_EQ(unknown.code, 3) << unknown;
+  EXPECT_TRUE(unknown.told("does not say where its base is")) << unknown;
+  EXPECT_EQ(run("export out -o base.txt --what trajectory --body 0,0,0.1,0,0").code, 2);
+
   // What cannot be.
   const Outcome full = run("export out -o full.las", "ulimit -f 16; trap '' XFSZ; ");
   EXPECT_EQ(full.code, 5) << full;
@@ -107,6 +112,22 @@ TEST_F(Exports, AllPathsAreOneAndRunsWriteTheirExports) {
 }
 
 /// The recording is gone: models have the pictures that the map keeps.
+TEST_F(Exports, TheBaseOfABagHasAPath) {
+  ASSERT_EQ(run("synth room -o world --frames 30 --seed 1 --odometry ideal --mcap on -q").code, 0);
+  ASSERT_EQ(run("map world/robot0/recording.mcap -o out -q --set output.views=").code, 0);
+  ASSERT_EQ(run("export out -o base.txt --what trajectory --body base").code, 0);
+  ASSERT_EQ(run("export out -o camera.txt --what trajectory").code, 0);
+
+  // In generated worlds the base is where the camera is, x ahead and z up.
+  const auto base = dataset::read_trajectory(path("base.txt"));
+  const auto camera = dataset::read_trajectory(path("camera.txt"));
+  ASSERT_TRUE(base && camera);
+  ASSERT_EQ(base->size(), camera->size());
+  const Eigen::Matrix3d& ahead = (*camera)[7].world_from_camera.rotation;
+  EXPECT_LT(((*base)[7].world_from_camera.rotation.col(0) - ahead.col(2)).norm(), 1e-5);
+  EXPECT_LT(((*base)[7].world_from_camera.rotation.col(2) + ahead.col(1)).norm(), 1e-5);
+}
+
 TEST_F(Exports, KeptPicturesReplaceARecordingThatIsGone) {
   ASSERT_EQ(run("synth room -o world --frames 60 --width 320 --height 240 -q").code, 0);
   const Outcome mapped = run("map world/robot0 -o out -q --set store.images=whole --set output.views=");
