@@ -39,11 +39,6 @@ class CheckWords(unittest.TestCase):
         self.write("src/net/a.cpp", 'int hello = 1;\nconst char* text = "hello";  // hello\nint welcome = hello;\n')
         self.assertEqual(self.found(), ["src/net/a.cpp:1"])
 
-    def test_folder_that_is_excepted(self):
-        self.write("src/net/http/a.cpp", "int told = 1;\n/// Whether it is a stranger.\nint x;\n")
-        self.write("src/net/a.cpp", "int told = 1;\n/// Whether it is a stranger.\nint x;\n")
-        self.assertEqual(self.found(), ["src/net/a.cpp:1", "src/net/a.cpp:2"])
-
     def test_openings_of_comments(self):
         for opening in ["What it costs.", "Whether the camera is lost.", "Of the last frame.", "How it began.",
                         "Those that fit; all if none do.", "As the file says.", "Where the camera is", "So many fit."]:
