@@ -17,7 +17,7 @@ static const std::array<const char*, 24> kWords = {"ROBOT", "mapping", "the",   
                                                    "frame", "in",      "model",  "error",  "scale", "GRAPH"};
 
 namespace {
-/// How text is written.
+/// Size, colour and stroke of text.
 struct Pen {
   double scale;
   cv::Scalar color;
