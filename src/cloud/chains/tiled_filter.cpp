@@ -99,7 +99,7 @@ core::Result<void> join(const std::vector<fs::path>& pieces, std::size_t points,
   return out.commit();
 }
 
-/// Margin around a tile whose points decide about its own, metres.
+/// Radius around a tile whose points decide about its own, metres.
 core::Result<double> margin_of(const FilterChain& chain, double tile_m) {
   const auto reach = chain.reach_m();
   if (!reach) return tl::unexpected(reach.error());

@@ -17,7 +17,7 @@ static const std::array<const char*, 24> kWords = {"ROBOT", "mapping", "the",   
                                                    "frame", "in",      "model",  "error",  "scale", "GRAPH"};
 
 namespace {
-/// Size, colour and stroke of text.
+/// Settings of a line of text.
 struct Pen {
   double scale;
   cv::Scalar color;
