@@ -18,6 +18,7 @@ FOLDERS = ["src", "include", "maps", "viz", "examples"]
 LONGEST = 60
 # Tables, whose lines are alike: their parts would have no name of their own.
 TABLES = {"SynthOptions::declare": "an entry for each option of a world, in the order of the help",
+          "ExportOptions::declare": "the same of exports",
           "report_style": "the style sheet of the report, a literal"}
 
 MOST_PARAMETERS = 6
