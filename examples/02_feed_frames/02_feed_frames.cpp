@@ -9,11 +9,14 @@ int main() {
   plumbline::sensor::Camera camera;
   camera.color = {320, 240, 260.0, 260.0, 159.5, 119.5};  // size, focal lengths and centre, pixels
   auto mapper = plumbline::Mapper::start(camera);         // without a folder: a temporary one
+
+  // A wall of random tiles, 2 m away everywhere
   cv::Mat_<cv::Vec3b> tiles(40, 70), wall(240, 420);
   cv::randu(tiles, 0, 255);
   wall.forEach([&](cv::Vec3b& pixel, const int* at) { pixel = tiles(at[0] / 6, at[1] / 6); });
   const cv::Mat depth(wall.rows, camera.color.width, CV_32FC1, cv::Scalar(2.0));  // metres
 
+  // The camera slides by two pixels from frame to frame
   for (int i = 0; mapper && i < 30; ++i) {
     const cv::Mat color = wall.colRange(2 * i, 2 * i + camera.color.width);
     const auto number = mapper->push({i / 30.0, {}, color, depth, {}});

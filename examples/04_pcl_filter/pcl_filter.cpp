@@ -38,6 +38,7 @@ Points::Ptr picture() {
         normal = Eigen::Vector3f(0.0F, -1.0F, 0.0F);
       }
 
+      // The box, whose border hangs between it and the wall
       const bool box = u >= 100 && u < 200 && v >= 60 && v < 160;
       const bool border = box && (u == 100 || u == 199 || v == 60 || v == 159);
       if (box) depth = border ? 2.1F : 1.5F;

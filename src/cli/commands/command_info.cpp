@@ -86,7 +86,7 @@ core::Result<void> describe_result(const std::filesystem::path& folder, bool jso
 }
 
 core::Result<void> describe_cloud(const std::filesystem::path& file) {
-  // Large coordinates are read with a shift
+  // Floats hold large coordinates only less a shift
   const auto read = cloud::read_cloud(file, cloud::LargeCoordinates::kShifted);
   if (!read) return tl::unexpected<core::Error>(read.error());
 

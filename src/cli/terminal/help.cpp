@@ -103,7 +103,7 @@ std::string usage_problem(const CLI::App& app, const CLI::ParseError& error) {
     if (flag == words.end()) return "a command is required" + help;
   }
 
-  // Unknown flags and words
+  // Flags are explained first: a word may be the value of one
   if ((unknown || missing) && flag != words.end()) return option_problem(*asked, *flag) + help;
   if (unknown && word != words.end()) return fmt::format("'{}' is one argument too many{}", *word, help);
   return plain_error(error.what()) + help;

@@ -252,7 +252,7 @@ class ClustersFilter : public Filter {
       *means += part;
     }
 
-    // Clusters of means
+    // Voxels that touch are one cluster
     const std::vector<pcl::Indices> groups = clusters_of(means, distance_m, 1);
     std::vector<std::uint32_t> group_of(means->size());
     for (std::size_t g = 0; g < groups.size(); ++g) {
