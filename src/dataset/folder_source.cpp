@@ -22,10 +22,11 @@ class FolderSource final : public FrameSource, public BodySource {
   [[nodiscard]] const std::string& format() const override { return layout_.format; }
   [[nodiscard]] const sensor::Camera& camera() const override { return camera_; }
   [[nodiscard]] std::size_t size() const override { return layout_.pairs.size(); }
-  [[nodiscard]] std::size_t missing() const override { return layout_.missing; }
+  [[nodiscard]] RecordingNotes notes() const override {
+    return {layout_.missing, doubt_, layout_.truth_is_odometry};
+  }
   [[nodiscard]] PairInfo info(std::size_t index) const override { return layout_.pairs.at(index); }
   [[nodiscard]] std::optional<geometry::Trajectory> truth() const override { return layout_.truth; }
-  [[nodiscard]] bool truth_is_odometry() const override { return layout_.truth_is_odometry; }
   [[nodiscard]] BodyReadings body_readings(double imu_after, double odometry_after,
                                            double until) const override {
     if (layout_.body == nullptr) return {};
@@ -34,7 +35,6 @@ class FolderSource final : public FrameSource, public BodySource {
     readings.body_from_camera = layout_.body->body_from_camera;
     return readings;
   }
-  [[nodiscard]] std::string doubt() const override { return doubt_; }
   void set_doubt(std::string doubt) { doubt_ = std::move(doubt); }
 
   [[nodiscard]] std::unique_ptr<FrameSource> taken_by(const sensor::Camera& better) const override {

@@ -20,7 +20,7 @@ struct Layout;
 /// mm, up to 13.1 m.
 inline constexpr double kFloatDepthScale = 5000.0;
 
-/// What is wrong with pixels as an image of the camera, `reduction` times as large as its size; "": nothing.
+/// The fault of pixels as an image of the camera, `reduction` times as large as its size; "": there is none.
 std::string color_problem(const cv::Mat& image, const sensor::Pinhole& camera, int reduction = 1);
 std::string depth_problem(const cv::Mat& image, const sensor::Pinhole& camera);
 

@@ -125,6 +125,8 @@ core::Result<ListedFrames> leave_out_missing(const std::string& folder, Layout& 
   ListedFrames listed;
   std::vector<PairInfo> there;
   std::string first;
+
+  // Numbers of the listed frames among those that exist.
   for (PairInfo& pair : layout.pairs) {
     listed.stamps.push_back(pair.stamp);
     const std::string missing = missing_file(layout, pair);
@@ -236,6 +238,7 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
     layout_options.depth_delay_s = (*chosen)->reading.camera.depth_delay_s;
   }
 
+  // The frames that it lists, and what else it says.
   auto layout = read_any(folder, options, layout_options, log);
   if (!layout && is_result(folder)) {
     return core::input_error(fmt::format(
@@ -246,12 +249,15 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
   layout->folder = folder;
   if (layout_options.body && layout->body == nullptr && is_folder(folder))
     layout->body = read_body_tables(folder, !layout->truth_is_odometry, log);
+
+  // Frames with stamps of their own, whose files exist.
   round_stamps(layout->pairs);
   drop_same_stamps(folder.string(), *layout, log);
   const auto listed = leave_out_missing(folder.string(), *layout, log);
   if (!listed) return tl::unexpected(listed.error());
   if (!chosen) return tl::unexpected(chosen.error());
 
+  // The camera, from its file, the layout or the images.
   auto camera = complete_camera(folder, *chosen, *layout, log);
   if (!camera) return tl::unexpected(camera.error());
   if (auto likely = check_focal_lengths(*camera, folder.string()); !likely)
@@ -259,6 +265,7 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
   layout->color_reduction = stored_reduction(*layout, *camera);
   layout->gives_odometry = layout->truth_is_odometry && options.poses == PoseUse::kPrior;
   if (auto kinds = check_image_kinds(*layout, *camera, log); !kinds) return tl::unexpected(kinds.error());
+
   if (auto selected = select(options, folder.string(), *listed, *layout); !selected)
     return tl::unexpected(selected.error());
 
@@ -268,6 +275,7 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
   const std::string name = name_of(place, folder);
   auto source = make_folder_source(name, *layout, *camera);
 
+  // Depth whose unit is unlikely makes any map doubtful.
   const auto scale = check_depth_scale(*source, folder.string());
   if (!scale) return tl::unexpected(scale.error());
   if (!scale->text.empty()) log.warning(scale->text);

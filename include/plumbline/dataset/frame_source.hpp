@@ -26,7 +26,7 @@ class MessageStream;
 
 enum class ImageList : std::uint8_t { kColor, kDepth };
 
-/// Where an image is: its place in one of the lists of what holds the images, in the order of that.
+/// The place of an image in one of the two lists of a recording, in the order of the file that has them.
 struct ImageId {
   ImageList list = ImageList::kColor;
   std::size_t number = 0;
@@ -54,15 +54,11 @@ struct StoredPair {
   StoredImage depth;
 };
 
-/// Counts of a live source's images.
-struct LiveReport {
-  std::size_t taken = 0;       ///< frames
-  std::size_t dropped = 0;     ///< frames that arrived while too many waited
-  std::size_t backwards = 0;   ///< frames whose stamp was not later than the last one's
-  std::size_t unpaired = 0;    ///< images of either kind without one of the other near them
-  std::size_t lost = 0;        ///< messages that the network reported as lost
-  std::size_t kept = 0;        ///< frames whose images were kept, to be read once more
-  std::size_t kept_bytes = 0;  ///< of these, packed
+/// Remarks on a recording besides its frames.
+struct RecordingNotes {
+  std::size_t missing = 0;         ///< frames that it lists and that are not among size(): no files
+  std::string doubt{};             ///< reason to doubt any map of it, such as depth in an unlikely unit; ""
+  bool truth_is_odometry = false;  ///< truth() is the path from the recorder's own odometry
 };
 
 /// Read access to one recording. All const methods are thread-safe: frames may be decoded side by side.
@@ -74,8 +70,6 @@ class FrameSource {
       const = 0;  ///< one of layout_names(), "mcap", "db3", "bag" or "synth"
   [[nodiscard]] virtual const sensor::Camera& camera() const = 0;
   [[nodiscard]] virtual std::size_t size() const = 0;
-  /// Number of frames that the recording lists and that are not among size(): their files do not exist.
-  [[nodiscard]] virtual std::size_t missing() const { return 0; }
   [[nodiscard]] virtual PairInfo info(std::size_t index) const = 0;
   /// Decoded, rectified, depth in metres, gray filled in. An error is about this frame only: skip it.
   [[nodiscard]] virtual core::Result<sensor::RgbdFrame> read(std::size_t index) const = 0;
@@ -90,34 +84,13 @@ class FrameSource {
   [[nodiscard]] virtual std::unique_ptr<FrameSource> taken_by(const sensor::Camera& /*better*/) const {
     return nullptr;
   }
-  /// True if frames arrive while others are read: size() grows, and the final number of frames is not known.
-  [[nodiscard]] virtual bool live() const { return false; }
-  /// For a live source: waits, at most so long, until decided(index).
-  virtual void wait_for(std::size_t /*index*/, std::chrono::milliseconds /*most*/) const {}
-  /// For a live source: true if frame `index` can be read, or if it is known that no such frame will come.
-  [[nodiscard]] virtual bool decided(std::size_t /*index*/) const { return true; }
-  /// For a live source: keeps frame `index`, one of the latest 256 or so, so that it can be read again;
-  /// others are released.
-  virtual void keep(std::size_t /*index*/) const {}
-  /// For a live source: frame `index` is no longer needed; it can be read again only if it was kept.
-  virtual void release(std::size_t /*index*/) const {}
-  /// True if frame `index`, which has been read, is the last one. A live source may wait until that is known,
-  /// or until `stop`: then it is false.
-  [[nodiscard]] virtual bool is_last(std::size_t index, const core::StopToken& /*stop*/) const {
-    return index + 1 == size();
-  }
-  /// For a live source: true if the result is not needed any more.
-  [[nodiscard]] virtual bool given_up() const { return false; }
-  /// For a live source: ends it and the files that it writes itself. Error (kOutput): the record.
-  [[nodiscard]] virtual core::Result<void> finish() const { return {}; }
-  /// Report of a live source that has ended.
-  [[nodiscard]] virtual LiveReport report() const { return {}; }
-  /// Reason to doubt any map of this recording, such as depth in an unlikely unit; "" if there is none.
-  [[nodiscard]] virtual std::string doubt() const { return ""; }
   /// Truth that comes with the recording, if any.
   [[nodiscard]] virtual std::optional<geometry::Trajectory> truth() const = 0;
-  /// True if truth() is the path from the recorder's own odometry.
-  [[nodiscard]] virtual bool truth_is_odometry() const { return false; }
+  [[nodiscard]] virtual RecordingNotes notes() const { return {}; }
+
+  [[nodiscard]] std::size_t missing() const { return notes().missing; }
+  [[nodiscard]] std::string doubt() const { return notes().doubt; }
+  [[nodiscard]] bool truth_is_odometry() const { return notes().truth_is_odometry; }
 };
 
 /// Use of the poses that come with a recording.
@@ -138,6 +111,9 @@ struct TopicNames {
   }
 };
 
+/// Total size of the frames that may wait to be mapped, by default; what comes beyond is dropped.
+inline constexpr std::size_t kMostWaitingBytes = std::size_t{1} << 30U;
+
 /// Options of live sources.
 struct LiveOptions {
   /// Opens the stream of an address, and sets the topics that the address names; empty: live sources are
@@ -149,7 +125,7 @@ struct LiveOptions {
   std::filesystem::path record;              ///< an MCAP file of the frames that were taken; "": none
   bool replace = false;                      ///< replace an existing file
   std::chrono::milliseconds patience{5000};  ///< time within which the first image must arrive
-  std::size_t most_waiting_bytes = std::size_t{1024} << 20U;  ///< total size of waiting messages
+  std::size_t most_waiting_bytes = kMostWaitingBytes;
 };
 
 struct OpenOptions {

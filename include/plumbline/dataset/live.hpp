@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/dataset/live_frame_source.hpp"
 #include "plumbline/dataset/message_stream.hpp"
 
 namespace plumbline::dataset {
@@ -18,12 +18,12 @@ bool is_live_address(const std::string& input);
 /// thread of its own, and pairs them by stamp. Frames that arrive while LiveOptions::most_waiting_bytes of
 /// others wait are dropped before they get a number, as are those whose stamp is not later than the last
 /// one's; both are counted and reported. The source ends when LiveOptions::stop says so or its time is over.
-/// Only the last frames and those that were kept (FrameSource::keep) can be read. Errors: kInput (no camera
+/// Errors: kInput (no camera
 /// within LiveOptions::patience: topics and types that were seen are named; no camera calibration),
 /// kUsage (options that make no sense for what is live; topics that are not certain), kOutput (the record).
-core::Result<std::unique_ptr<FrameSource>> open_live(const std::string& address,
-                                                     std::unique_ptr<MessageStream> stream,
-                                                     const OpenOptions& options, core::Log& log);
+core::Result<std::unique_ptr<LiveFrameSource>> open_live(const std::string& address,
+                                                         std::unique_ptr<MessageStream> stream,
+                                                         const OpenOptions& options, core::Log& log);
 
 /// A few lines for people: what is published, and what open_live would take and why.
 core::Result<std::string> live_to_text(const std::string& address, MessageStream& stream,

@@ -3,18 +3,19 @@
 
 // Frames that come one by one, of a camera or of another program, as a recording that grows.
 #include <cstddef>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
 
-#include "plumbline/core/stop.hpp"
-#include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/dataset/live_frame_source.hpp"
 
 namespace plumbline::dataset {
 
+struct LiveCamera;
+
 struct LiveFramesOptions {
   std::string name = "live";
+  std::size_t most_waiting_bytes = kMostWaitingBytes;
 };
 
 /// One pair of images from a camera.
@@ -33,36 +34,31 @@ struct LiveFrame {
 /// Errors (kInput): cannot be read, or the source has no stored images.
 core::Result<LiveFrame> stored_frame(const FrameSource& source, std::size_t index);
 
-/// Thread-safe: one thread pushes, others read a recording() of them. Of frames that were released, only
-/// those that were to be kept can be read again; they lie in a file without a name, compressed.
+/// Thread-safe: one thread pushes, others read a recording() of them.
 class LiveFrames {
  public:
   explicit LiveFrames(const sensor::Camera& camera, LiveFramesOptions options = {});
-  ~LiveFrames();
-
   /// Images as the camera took them; they are undistorted and registered when read. They are copied. Errors
   /// (kInput): an image of another kind or size, depth that is NaN everywhere, a stamp that is not after the
-  /// last one, or after close().
+  /// last one, or after close(); too many frames wait (wait_for_room).
   core::Result<void> push(const LiveFrame& frame);
   /// No more frames will come.
   void close();
   /// Abandons the run, because its result is not needed: it ends with an error as soon as it can.
   void abandon();
 
-  /// Number of frames that have arrived and are not being read yet.
+  /// Number of frames that have arrived and are not being worked on yet.
   [[nodiscard]] std::size_t waiting() const;
-  /// Waits until fewer than `most` frames wait, at most this long; false on timeout.
+  /// Waits until fewer than `most` frames wait, and fewer bytes than most_waiting_bytes, at most this long;
+  /// false on timeout.
   [[nodiscard]] bool wait_for_room(std::size_t most, double seconds) const;
-  /// Sets the folder for kept frames; it needs room. Without a folder they stay in memory.
-  void keep_in(const std::filesystem::path& folder);
 
   /// The frames as a live source, which outlives this.
-  [[nodiscard]] std::unique_ptr<FrameSource> recording() const;
+  [[nodiscard]] std::unique_ptr<LiveFrameSource> recording() const;
 
  private:
-  class Store;
-  class View;
-  std::shared_ptr<Store> store_;
+  sensor::Camera camera_;
+  std::shared_ptr<LiveCamera> live_;
 };
 
 }  // namespace plumbline::dataset

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/dataset/live_frame_source.hpp"
 #include "plumbline/pipeline/data.hpp"
 
 namespace plumbline::pipeline {
@@ -50,30 +50,16 @@ class RobotRecordings : public dataset::FrameSource {
   [[nodiscard]] const std::string& name() const override { return name_; }
   [[nodiscard]] const std::string& format() const override { return recordings_.front()->format(); }
   [[nodiscard]] const sensor::Camera& camera() const override { return recordings_.front()->camera(); }
-  [[nodiscard]] std::size_t size() const override {
-    return live() ? recordings_.front()->size() : order_.size();
-  }
-  /// Sum over all recordings.
-  [[nodiscard]] std::size_t missing() const override;
+  [[nodiscard]] std::size_t size() const override { return live_ != nullptr ? live_->size() : order_.size(); }
+  /// The sum of what is missing, and the first doubt that one of the recordings has.
+  [[nodiscard]] dataset::RecordingNotes notes() const override;
   [[nodiscard]] dataset::PairInfo info(std::size_t index) const override;
   [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override;
-  /// True if the recording is live, which only a single one may be.
-  [[nodiscard]] bool live() const override { return recordings_.front()->live(); }
-  void wait_for(std::size_t index, std::chrono::milliseconds most) const override {
-    recordings_.front()->wait_for(index, most);
-  }
-  [[nodiscard]] bool decided(std::size_t index) const override { return recordings_.front()->decided(index); }
-  void keep(std::size_t index) const override { recordings_.front()->keep(index); }
-  void release(std::size_t index) const override { recordings_.front()->release(index); }
-  [[nodiscard]] bool given_up() const override { return recordings_.front()->given_up(); }
-  /// True if the frame is the last one of its robot.
-  [[nodiscard]] bool is_last(std::size_t index, const core::StopToken& stop) const override {
-    return recordings_[static_cast<std::size_t>(robot_of(index))]->is_last(frame_of(index), stop);
-  }
-  [[nodiscard]] core::Result<void> finish() const override { return recordings_.front()->finish(); }
-  [[nodiscard]] dataset::LiveReport report() const override { return recordings_.front()->report(); }
-  /// The first that one of the recordings has.
-  [[nodiscard]] std::string doubt() const override;
+  /// The live source, which can only be a single one; null: these are recordings.
+  [[nodiscard]] dataset::LiveFrameSource* live() { return live_; }
+  [[nodiscard]] const dataset::LiveFrameSource* live() const { return live_; }
+  /// True if the frame is the last one of its robot; as LiveFrameSource's.
+  [[nodiscard]] bool is_last(std::size_t index, const core::StopToken& stop) const;
   [[nodiscard]] std::optional<geometry::Trajectory> truth_of(std::int32_t robot) const {
     return recordings_[static_cast<std::size_t>(robot)]->truth();
   }
@@ -98,6 +84,7 @@ class RobotRecordings : public dataset::FrameSource {
   [[nodiscard]] std::shared_ptr<const dataset::FrameSource> corrected(std::size_t index) const;
   std::string name_;
   std::vector<std::unique_ptr<dataset::FrameSource>> recordings_;
+  dataset::LiveFrameSource* live_ = nullptr;
   std::vector<RobotInfo> robots_;
   std::vector<Place> order_;  ///< empty for live sources
   mutable std::mutex mutex_;  ///< of what follows

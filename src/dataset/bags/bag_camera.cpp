@@ -148,6 +148,8 @@ core::Result<std::optional<InfoCamera>> read_info(const BagSurvey& survey, const
   const auto wrong = [&place](const std::string& what) {
     return core::input_error(fmt::format("{} {}; name a camera file with --camera", place, what));
   };
+
+  // Regions and binning, where the images have them.
   const auto pinholes = pinholes_of(*message, by_p);
   if (!pinholes) return wrong(pinholes.error());
   InfoCamera camera{pinholes->image, {}, frame_name(message->header.frame_id)};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What holds the images of a recording: files, a film, a bag, a container, or the queue of a live camera.
+// The holders of a recording's images: files, a film, a bag, a container, or the queue of a live camera.
 #include <array>
 #include <filesystem>
 #include <memory>
@@ -22,7 +22,7 @@ class ImageSource {
   ImageSource(const ImageSource&) = delete;
   ImageSource& operator=(const ImageSource&) = delete;
 
-  /// The image as it is stored. Error (kInput): names it and what is wrong.
+  /// The image as it is stored. Error (kInput): names it and the fault.
   [[nodiscard]] virtual core::Result<cv::Mat> read(ImageId id) = 0;
   /// The same, with the bytes of its file where it is stored as those.
   [[nodiscard]] virtual core::Result<StoredImage> stored(ImageId id);

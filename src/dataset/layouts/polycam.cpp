@@ -95,6 +95,7 @@ core::Result<Layout> read_polycam(const fs::path& folder, const LayoutOptions& /
   std::size_t left_out = 0;
   std::string first_problem;
 
+  // Frames whose own cameras can be read.
   for (const PairInfo& pair : std::exchange(layout.pairs, {})) {
     const fs::path image = layout.images->file(pair.color);
     const auto frame = read_polycam_camera(cameras / (image.stem().string() + ".json"));
@@ -102,6 +103,7 @@ core::Result<Layout> read_polycam(const fs::path& folder, const LayoutOptions& /
       if (left_out++ == 0) first_problem = "; the first of them: " + frame.error().message;
       continue;
     }
+
     layout.pairs.push_back(pair);
     layout.pairs.back().camera = static_cast<int>(layout.frame_cameras.size());
     layout.frame_cameras.push_back(frame->pinhole);

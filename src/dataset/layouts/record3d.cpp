@@ -111,6 +111,7 @@ core::Result<Layout> read_record3d(const fs::path& folder, const LayoutOptions& 
   auto camera = record3d_camera(place / "metadata.json", metadata);
   if (!camera) return tl::unexpected(camera.error());
 
+  // Images with one number are a pair.
   const auto color = numbered_images(place / "rgb");
   const auto depth = numbered_images(place / "depth");
   Layout layout = numbered_layout("record3d", color, depth, camera->camera.fps);
@@ -122,6 +123,7 @@ core::Result<Layout> read_record3d(const fs::path& folder, const LayoutOptions& 
   geometry::Trajectory poses;
   std::size_t without = 0;
 
+  // Stamps and poses of the phone, by number.
   for (PairInfo& pair : layout.pairs) {
     const long long number = color[pair.color.number].first;
     const json& stamp = element(metadata, "frameTimestamps", number);
@@ -139,6 +141,7 @@ core::Result<Layout> read_record3d(const fs::path& folder, const LayoutOptions& 
   std::stable_sort(poses.begin(), poses.end(), earlier);
   if (without > 0)
     log.warning(fmt::format("{}: {} frames have no pose there", (place / "metadata.json").string(), without));
+
   add_record3d_cameras(metadata, camera->camera.color, color, layout);
   layout.camera = std::move(*camera);
 

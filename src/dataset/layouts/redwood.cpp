@@ -86,6 +86,7 @@ core::Result<Layout> read_redwood(const fs::path& folder, const LayoutOptions& o
         folder.string(), colors ? "depth/" : "colour"));
   }
 
+  // Both folders have images.
   const auto color = numbered_images(*colors);
   const auto depth = numbered_images(folder / "depth");
   for (const auto& [images, path] : {std::pair(&color, *colors), std::pair(&depth, folder / "depth")}) {
@@ -95,6 +96,7 @@ core::Result<Layout> read_redwood(const fs::path& folder, const LayoutOptions& o
     }
   }
 
+  // By stamps where all names have them, else by number.
   Layout layout = numbered_layout("redwood", color, depth, options.fps);
   const auto c = by_stamp(color);
   const auto d = by_stamp(depth);

@@ -69,6 +69,8 @@ core::Result<Layout> read_seven_scenes(const fs::path& folder, const LayoutOptio
       ++incomplete;
       continue;
     }
+
+    // Frames have numbers instead of stamps.
     const double stamp = number / options.fps;
     layout.pairs.push_back({stamp, stamp, images->add(ImageList::kColor, files.color),
                             images->add(ImageList::kDepth, files.depth)});

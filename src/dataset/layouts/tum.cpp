@@ -65,11 +65,13 @@ core::Result<std::vector<StampedFile>> read_list(const fs::path& list, core::Log
   if (!lines) return tl::unexpected(lines.error());
   std::vector<StampedFile> files;
 
+  // Stamps, and names that may hold blanks.
   for (const TextLine& line : *lines) {
     if (line.words.size() < 2) {
       return core::input_error(
           fmt::format("{}:{}: expected 'stamp file', found one word", list.string(), line.number));
     }
+
     const auto stamp = read_stamp(list.string(), line, 0);
     if (!stamp) return tl::unexpected(stamp.error());
     std::string name = line.words[1];
@@ -91,10 +93,13 @@ core::Result<Layout> read_two_lists(const fs::path& folder, const LayoutOptions&
         fmt::format("{}: {} is missing (a TUM recording needs rgb.txt and depth.txt, or associations.txt)",
                     folder.string(), name));
   }
+
   auto color = read_list(folder / "rgb.txt", log);
   if (!color) return tl::unexpected(color.error());
   auto depth = read_list(folder / "depth.txt", log);
   if (!depth) return tl::unexpected(depth.error());
+
+  // Each colour image with the depth nearest in time.
   Layout layout{"tum"};
   layout.pairs = pair_by_stamp(*color, *depth, options.max_pair_gap_s, options.depth_delay_s);
   layout.images = images_of(*color, *depth);

@@ -1,37 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <fmt/format.h>
+#include "live/live_source.hpp"
 
-#include <cctype>
-#include <map>
 #include <utility>
 
-#include "bags/bag_camera.hpp"
-#include "bags/bag_recording.hpp"
-#include "depth_check.hpp"
 #include "frame_images.hpp"
-#include "live/live_stream.hpp"
-#include "plumbline/dataset/live.hpp"
-#include "recording_camera.hpp"
 
 namespace plumbline::dataset {
 namespace {
 
-constexpr const char* kScheme = "ros2://";
-
-/// State that all views of one live camera share.
-struct LiveCamera {
-  std::string name;
-  std::string doubt;
-  Layout layout;  ///< layout of the first frames; its images come from the stream
-  std::shared_ptr<LiveStream> stream;
-  std::map<std::string, geometry::Rigid3> body_from_camera;  ///< by the body's frame
-};
-
-class LiveSource final : public FrameSource, public BodySource {
+class LiveSource final : public LiveFrameSource, public BodySource {
  public:
   LiveSource(std::shared_ptr<LiveCamera> live, sensor::Camera camera, const sensor::Pinhole& rectified,
              std::vector<double> delays)
       : live_(std::move(live)),
+        queue_(*live_->queue),
         camera_(std::move(camera)),
         rectified_(rectified),
         rectifier_(camera_, rectified),
@@ -40,12 +22,12 @@ class LiveSource final : public FrameSource, public BodySource {
   [[nodiscard]] const std::string& name() const override { return live_->name; }
   [[nodiscard]] const std::string& format() const override { return live_->layout.format; }
   [[nodiscard]] const sensor::Camera& camera() const override { return camera_; }
-  [[nodiscard]] std::string doubt() const override { return live_->doubt; }
+  [[nodiscard]] RecordingNotes notes() const override { return {0, live_->doubt}; }
   [[nodiscard]] std::optional<geometry::Trajectory> truth() const override { return std::nullopt; }
-  [[nodiscard]] std::size_t size() const override { return live_->stream->size(); }
+  [[nodiscard]] std::size_t size() const override { return queue_.size(); }
 
   [[nodiscard]] PairInfo info(std::size_t index) const override {
-    PairInfo pair = live_->stream->info(index);
+    PairInfo pair = queue_.info(index);
     // One after another, as a recording's are: to the last digit.
     for (const double delay : delays_) pair.depth_stamp += delay;
     return pair;
@@ -58,7 +40,9 @@ class LiveSource final : public FrameSource, public BodySource {
     auto depth = read_depth(live_->layout, pair.depth, camera_.depth ? *camera_.depth : camera_.color,
                             camera_.depth_scale);
     if (!depth) return tl::unexpected(depth.error());
-    return rectified_frame(index, pair, *color, *depth, rectifier_);
+    sensor::RgbdFrame frame = rectified_frame(index, pair, *color, *depth, rectifier_);
+    frame.odometry = queue_.odometry(index);
+    return frame;
   }
 
   [[nodiscard]] std::unique_ptr<FrameSource> taken_by(const sensor::Camera& better) const override {
@@ -67,194 +51,55 @@ class LiveSource final : public FrameSource, public BodySource {
     return std::make_unique<LiveSource>(live_, better, rectified_, std::move(delays));
   }
 
-  [[nodiscard]] bool live() const override { return true; }
+  [[nodiscard]] bool decided(std::size_t index) const override { return queue_.decided(index + live_->lag); }
   void wait_for(std::size_t index, std::chrono::milliseconds most) const override {
-    live_->stream->wait_for(index, most);
+    queue_.wait_for(index + live_->lag, most);
   }
-  [[nodiscard]] bool decided(std::size_t index) const override { return live_->stream->decided(index); }
-  void keep(std::size_t index) const override { live_->stream->keep(index); }
-  [[nodiscard]] core::Result<void> finish() const override { return live_->stream->finish(); }
+  [[nodiscard]] bool is_last(std::size_t index, const core::StopToken& stop) const override {
+    return queue_.is_last(index, stop);
+  }
+  [[nodiscard]] bool given_up() const override { return queue_.given_up(); }
+  void hand_out(std::size_t index) override { queue_.hand_out(index); }
+  void keep(std::size_t index) override { queue_.keep(index); }
+  void release(std::size_t index) override { queue_.release(index); }
+  void keep_in(const std::filesystem::path& folder) override { queue_.keep_in(folder); }
+
+  [[nodiscard]] LiveReport report() const override {
+    LiveReport report = live_->stream ? live_->stream->counts() : LiveReport();
+    const LiveReport taken = queue_.report();
+    report.taken = taken.taken;
+    report.kept = taken.kept;
+    report.kept_bytes = taken.kept_bytes;
+    return report;
+  }
+  [[nodiscard]] core::Result<void> finish() override {
+    return live_->stream ? live_->stream->finish() : core::Result<void>();
+  }
 
   [[nodiscard]] BodyReadings body_readings(double imu_after, double odometry_after,
                                            double until) const override {
+    if (!live_->stream) return {};
     BodyReadings readings = live_->stream->body_readings(imu_after, odometry_after, until);
     const auto known = live_->body_from_camera.find(live_->stream->body_frame());
     if (known != live_->body_from_camera.end()) readings.body_from_camera = known->second;
     return readings;
   }
 
-  [[nodiscard]] LiveReport report() const override {
-    const LiveCounts counts = live_->stream->counts();
-    return {counts.taken, counts.dropped, counts.backwards, counts.unpaired,
-            counts.lost,  counts.kept,    counts.kept_bytes};
-  }
-
  private:
   std::shared_ptr<LiveCamera> live_;
+  LiveQueue& queue_;
   sensor::Camera camera_;
   sensor::Pinhole rectified_;  ///< pinhole of the rectified images
   sensor::Rectifier rectifier_;
   std::vector<double> delays_;  ///< added to the stamps of depth
 };
 
-core::Result<void> fits_live(const std::string& address, const OpenOptions& options) {
-  const char* wrong = options.from_s > 0.0 || options.to_s < 1e299          ? "--from and --to"
-                      : options.every != 1                                  ? "--every"
-                      : options.format != "auto" && !options.format.empty() ? "--format"
-                      : options.poses == PoseUse::kGiven                    ? "--poses given"
-                                                                            : nullptr;
-  if (wrong == nullptr)
-    return options.live.record.empty() ? core::Result<void>()
-                                       : LiveRecord::check(options.live.record, options.live.replace);
-  return core::usage_error(
-      fmt::format("{}: is live; {} is about recordings (--for S ends the run)", address, wrong));
-}
-
-/// The messages that say what the cameras are.
-LiveRecord::Infos infos_of(const BagSurvey& survey, const ChosenTopics& topics) {
-  LiveRecord::Infos infos;
-  const auto first = [&](const ChosenTopic& chosen) -> std::optional<CameraInfoMessage> {
-    if (chosen.topic == nullptr) return std::nullopt;
-    auto message = survey.first(*chosen.topic, &MessageDecoder::camera_info);
-    return message ? std::optional<CameraInfoMessage>(std::move(*message)) : std::nullopt;
-  };
-  infos.color = first(topics.info);
-  if (topics.depth_info.topic != topics.info.topic) infos.depth = first(topics.depth_info);
-  return infos;
-}
-
-LiveRecord::Topics topics_of(const ChosenTopics& topics) {
-  const auto name = [](const ChosenTopic& chosen) {
-    return chosen.topic == nullptr ? "" : chosen.topic->topic.name;
-  };
-  return {topics.color.topic->topic, topics.depth.topic->topic, name(topics.info), name(topics.depth_info)};
-}
-
-/// The camera of the first frames, as open_recording finds that of a recording.
-core::Result<sensor::Camera> complete_live_camera(const std::string& address, const OpenOptions& options,
-                                                  const std::optional<ChosenCamera>& chosen,
-                                                  const LiveSurvey& found, const ChosenTopics& topics,
-                                                  Layout& layout, core::Log& log) {
-  auto camera = bag_camera(found.survey, topics, log);
-  if (!camera && options.camera.empty()) return tl::unexpected(camera.error());
-  if (camera) layout.camera = std::move(*camera);
-  if (layout.camera) layout.camera->camera.fps = usual_fps(layout.pairs);
-  auto complete = complete_camera(address, chosen, layout, log);
-  if (!complete) return tl::unexpected(complete.error());
-  layout.color_reduction = stored_reduction(layout, *complete);
-  if (auto kinds = check_image_kinds(layout, *complete, log); !kinds) return tl::unexpected(kinds.error());
-  return complete;
-}
-
-std::shared_ptr<LiveStream> make_stream(const std::string& address, std::unique_ptr<MessageStream> stream,
-                                        const ChosenTopics& topics, const std::vector<BagTopic>& body,
-                                        const std::optional<ChosenCamera>& chosen, const OpenOptions& options,
-                                        core::Log& log) {
-  LiveStream::Options how;
-  how.address = address;
-  how.max_pair_gap_s = options.max_pair_gap_s;
-  if (chosen) how.depth_delay_s = chosen->reading.camera.depth_delay_s;
-  how.for_s = options.live.for_s;
-  how.body = body;
-  how.stop = options.live.stop;
-  how.most_waiting_bytes = options.live.most_waiting_bytes;
-  const auto topic = [](const ChosenTopic& of) { return LiveTopic{of.topic->topic, of.topic->decoder}; };
-  return std::make_shared<LiveStream>(std::move(stream), topic(topics.color), topic(topics.depth), how, log);
-}
-
-/// Makes the first frames from the images of the survey. Error (kInput): none can be made.
-core::Result<void> begin(const std::string& address, const LiveSurvey& found, const ChosenTopics& topics,
-                         const OpenOptions& options, LiveCamera& live) {
-  for (const LiveMessage& message : found.images) live.stream->add(message);
-  if (!live.stream->wait_for_first(options.live.patience)) {
-    return core::input_error(fmt::format(
-        "{}: images of {} and {} come, but none of the two within {:g} s of each other; name "
-        "topics of one camera with ?color=/TOPIC&depth=/TOPIC",
-        address, topics.color.topic->topic.name, topics.depth.topic->topic.name, options.max_pair_gap_s));
-  }
-  live.layout.format = "ros2";
-  live.layout.pairs = live.stream->infos();
-  live.layout.images = live.stream;
-  return {};
-}
-
-/// Null where nothing is to be recorded.
-core::Result<std::unique_ptr<LiveRecord>> make_record(const LiveOptions& options, const BagSurvey& survey,
-                                                      const ChosenTopics& topics,
-                                                      const sensor::Camera& camera) {
-  if (options.record.empty()) return nullptr;
-  return LiveRecord::create(options.record, topics_of(topics), infos_of(survey, topics), camera);
-}
-
-/// Name of the source: "ros2_0" for "ros2://0?color=..."; a recorded source has its record's name.
-std::string name_of_address(const std::string& address) {
-  std::string name;
-  for (const char c : address.substr(0, address.find('?'))) {
-    if (std::isalnum(static_cast<unsigned char>(c)) != 0) name += c;
-    if (c == '/' && !name.empty() && name.back() != '_') name += '_';
-  }
-  return name;
-}
-
 }  // namespace
 
-bool is_live_address(const std::string& input) { return input.rfind(kScheme, 0) == 0; }
-
-core::Result<std::unique_ptr<FrameSource>> open_live(const std::string& address,
-                                                     std::unique_ptr<MessageStream> stream,
-                                                     const OpenOptions& options, core::Log& log) {
-  const LiveOptions& how = options.live;
-  if (auto fits = fits_live(address, options); !fits) return tl::unexpected(fits.error());
-  const auto chosen = choose_camera(address, options, log);
-  if (!chosen) return tl::unexpected(chosen.error());
-
-  // Listen until it is clear what the camera is.
-  const auto found = survey_stream(address, *stream, options.topics, how.patience, how.stop,
-                                   options.poses == PoseUse::kPrior);
-  if (!found) return tl::unexpected(found.error());
-  const auto topics = choose_topics(found->survey, options.topics);
-  if (!topics) return tl::unexpected(topics.error());
-  log.info(fmt::format("{}: colour from {}, depth from {}", address, topics->color.topic->topic.name,
-                       topics->depth.topic->topic.name));
-
-  auto live = std::make_shared<LiveCamera>();
-  live->name = how.record.empty() ? name_of_address(address) : how.record.stem().string();
-  live->stream = make_stream(address, std::move(stream), *topics, found->body, *chosen, options, log);
-  for (const char* frame : {"base_link", "base_footprint"}) {
-    if (const auto known = body_from_camera(found->survey, *topics, frame))
-      live->body_from_camera[frame] = *known;
-  }
-  if (auto begun = begin(address, *found, *topics, options, *live); !begun)
-    return tl::unexpected(begun.error());
-
-  // The first frames say the rest, as those of a recording do.
-  const auto camera = complete_live_camera(address, options, *chosen, *found, *topics, live->layout, log);
-  if (!camera) return tl::unexpected(camera.error());
-  if (auto likely = check_focal_lengths(*camera, address); !likely) return tl::unexpected(likely.error());
-  auto source =
-      std::make_unique<LiveSource>(live, *camera, camera->color, std::vector<double>{camera->depth_delay_s});
-  const auto doubt = check_depth_scale(*source, address);
-  if (!doubt) return tl::unexpected(doubt.error());
-  if (!doubt->text.empty()) log.warning(doubt->text);
-  if (doubt->doubted) live->doubt = doubt->text;
-
-  auto record = make_record(how, found->survey, *topics, *camera);
-  if (!record) return tl::unexpected(record.error());
-  live->stream->start(std::move(*record));
-  return source;
-}
-
-core::Result<std::string> live_to_text(const std::string& address, MessageStream& stream,
-                                       const OpenOptions& options) {
-  const auto found = survey_stream(address, stream, options.topics, options.live.patience, options.live.stop);
-  std::string text = fmt::format("live: {}\n{}", address, published_text(stream.topics()));
-  if (!found) {
-    if (stream.topics().empty()) return tl::unexpected(found.error());
-    return text + "note: " + found.error().message + "\n";
-  }
-  const auto topics = choose_topics(found->survey, options.topics);
-  if (topics) text += choice_text(*topics);
-  return text;
+std::unique_ptr<LiveFrameSource> make_live_source(std::shared_ptr<LiveCamera> live,
+                                                  const sensor::Camera& camera) {
+  return std::make_unique<LiveSource>(std::move(live), camera, camera.color,
+                                      std::vector<double>{camera.depth_delay_s});
 }
 
 }  // namespace plumbline::dataset

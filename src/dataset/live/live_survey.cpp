@@ -205,6 +205,8 @@ core::Result<LiveSurvey> survey_stream(const std::string& address, MessageStream
                                        const core::StopToken& stop, bool with_body) {
   const auto& readers = core::part<BagReaders>();
   if (!readers) return tl::unexpected(readers.error());
+
+  // Until it is certain which topics are the camera's.
   StreamSurveyor surveyor(address, stream, named, **readers);
   const auto until = Clock::now() + patience;
   while (Clock::now() < until && !surveyor.complete()) {
@@ -213,6 +215,8 @@ core::Result<LiveSurvey> survey_stream(const std::string& address, MessageStream
                            address + ": stopped before a camera was found; nothing is written");
     surveyor.listen();
   }
+
+  // Only the chosen images are received from now on.
   if (!surveyor.any_image()) return no_camera(address, stream.topics(), patience);
   LiveSurvey found = surveyor.take();
   const auto chosen = choose_topics(found.survey, named);

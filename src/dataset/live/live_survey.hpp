@@ -7,12 +7,11 @@
 #include <vector>
 
 #include "bags/topics.hpp"
+#include "live/live_queue.hpp"
 #include "plumbline/core/log.hpp"
 #include "plumbline/dataset/message_stream.hpp"
 
 namespace plumbline::dataset {
-
-using SharedBytes = std::shared_ptr<const Bytes>;
 
 struct LiveMessage {
   std::string topic;

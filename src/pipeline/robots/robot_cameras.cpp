@@ -58,7 +58,7 @@ void RobotCameras::after(std::size_t frame, const Slams& slams) {
   if (!refine_ || asked_ || !knows_enough(frame, slams)) return;
   asked_ = true;
   const bool ends_before = frame + kAnswerFrames + kUseFrames >= recordings_->size();
-  if (ends_before && !recordings_->live()) return;
+  if (ends_before && recordings_->live() == nullptr) return;
 
   answered_ = true;
   for (CameraRefinement& camera : cameras_) camera.asked_at(static_cast<std::int64_t>(frame));
@@ -171,7 +171,8 @@ void RobotCameras::estimate_finished(Slams& slams) {
   if (!refine_) return;
   // A live source ended before the answer was used: it is dropped, because for a recording of that length no
   // estimate would have been made before its end.
-  if (recordings_->live() && answered_ && (question_ != nullptr || recordings_->size() <= use_from_)) {
+  if (recordings_->live() != nullptr && answered_ &&
+      (question_ != nullptr || recordings_->size() <= use_from_)) {
     if (!waiting_.empty()) cameras_ = given_;
     for (CameraRefinement& camera : cameras_) camera.asked_at(-1);
     waiting_.assign(waiting_.size(), false);

@@ -94,7 +94,7 @@ std::string config_text(const MapRequest& request, const Graph& graph, int threa
 
 /// Text that identifies a recording without reading its images.
 std::string input_text(const RobotRecordings& source) {
-  if (source.live()) return "live: " + quoted(source.name()) + "\n";
+  if (source.live() != nullptr) return "live: " + quoted(source.name()) + "\n";
   core::Hash hash;
   for (std::size_t i = 0; i < source.size(); ++i) hash.number(source.info(i).stamp);
   std::string text = fmt::format("frames: {}\n", source.size());
@@ -303,13 +303,14 @@ class MapRun {
     if (auto ok = write_cameras(output_->path(), source_->robots(), cameras); !ok)
       return tl::unexpected(ok.error());
 
-    if (request_.live != nullptr) request_.live->keep_in(output_->path());
+    dataset::LiveFrameSource* const live = source_->live();
+    if (live != nullptr) live->keep_in(output_->path());
     if (request_.prepared) request_.prepared(output_->path());
     const auto report = run_graph(graph_, context, progress, request_.pace_hz);
-    if (!report && source_->given_up()) return tl::unexpected(report.error());
+    if (!report && live != nullptr && live->given_up()) return tl::unexpected(report.error());
     if (!report) return tl::unexpected(with_what_is_kept(report.error(), *output_));
 
-    const auto recorded = source_->finish();
+    const auto recorded = live != nullptr ? live->finish() : core::Result<void>();
 
     std::string input = request_.input;
     for (const std::string& other : request_.others) input += " " + other;
@@ -358,7 +359,7 @@ class MapRun {
     context.log = &log_;
 
     // A live camera ends by itself on request, and all frames that arrived are mapped.
-    context.stop = source_->live() && request_.live == nullptr ? core::StopToken() : stop;
+    context.stop = source_->live() != nullptr && request_.live == nullptr ? core::StopToken() : stop;
     context.asked = stop;
     context.output_folder = output_->path();
     context.input.source = source_.get();

@@ -17,8 +17,10 @@ namespace plumbline::pipeline {
 RobotRecordings::RobotRecordings(std::vector<std::unique_ptr<dataset::FrameSource>> recordings)
     : recordings_(std::move(recordings)) {
   if (recordings_.empty()) throw std::invalid_argument("RobotRecordings: no recordings");
-  const auto is_live = [](const auto& recording) { return recording->live(); };
-  if (recordings_.size() > 1 && std::any_of(recordings_.begin(), recordings_.end(), is_live))
+  for (const auto& recording : recordings_) {
+    if (auto* live = dynamic_cast<dataset::LiveFrameSource*>(recording.get())) live_ = live;
+  }
+  if (recordings_.size() > 1 && live_ != nullptr)
     throw std::invalid_argument("RobotRecordings: one of several is live");
 
   std::set<std::string> taken;
@@ -43,7 +45,7 @@ RobotRecordings::RobotRecordings(std::vector<std::unique_ptr<dataset::FrameSourc
     earliest_start = std::min(earliest_start, start);
     earliest_end = std::min(earliest_end, recording->info(recording->size() - 1).stamp);
   }
-  if (live()) return;
+  if (live_ != nullptr) return;
 
   const bool together = latest_start <= earliest_end;
   for (const RobotInfo& robot : robots_) {
@@ -60,9 +62,14 @@ RobotRecordings::RobotRecordings(std::vector<std::unique_ptr<dataset::FrameSourc
 }
 
 RobotRecordings::Place RobotRecordings::place(std::size_t index) const {
-  if (!live()) return order_.at(index);
-  const dataset::FrameSource& source = *recordings_.front();
-  return {source.info(index).stamp - source.info(0).stamp, 0, index};
+  if (live_ == nullptr) return order_.at(index);
+  return {live_->info(index).stamp - live_->info(0).stamp, 0, index};
+}
+
+bool RobotRecordings::is_last(std::size_t index, const core::StopToken& stop) const {
+  if (live_ != nullptr) return live_->is_last(index, stop);
+  const Place at = place(index);
+  return at.index + 1 == of(at).size();
 }
 
 dataset::PairInfo RobotRecordings::info(std::size_t index) const {
@@ -85,17 +92,14 @@ std::optional<std::size_t> RobotRecordings::frame_at(std::int32_t robot, double 
   return first;
 }
 
-std::size_t RobotRecordings::missing() const {
-  std::size_t missing = 0;
-  for (const auto& recording : recordings_) missing += recording->missing();
-  return missing;
-}
-
-std::string RobotRecordings::doubt() const {
+dataset::RecordingNotes RobotRecordings::notes() const {
+  dataset::RecordingNotes all;
   for (const auto& recording : recordings_) {
-    if (std::string doubt = recording->doubt(); !doubt.empty()) return doubt;
+    const dataset::RecordingNotes notes = recording->notes();
+    all.missing += notes.missing;
+    if (all.doubt.empty()) all.doubt = notes.doubt;
   }
-  return "";
+  return all;
 }
 
 void RobotRecordings::correct(std::size_t from, const std::vector<sensor::Camera>& cameras) {

@@ -100,8 +100,8 @@ class Runner {
       if (!started) return tl::unexpected(started.error());
     }
 
-    live_ = context_.input.recordings != nullptr && context_.input.recordings->live();
-    total_ = live_ ? std::numeric_limits<std::size_t>::max() : graph_.source().stage->frames();
+    if (context_.input.recordings != nullptr) live_ = context_.input.recordings->live();
+    total_ = live_ != nullptr ? std::numeric_limits<std::size_t>::max() : graph_.source().stage->frames();
     for (const Node& node : graph_.nodes) report_.stages.push_back({node.name, {}, 0.0});
     skip_done();
     const auto start = Clock::now();
@@ -119,7 +119,7 @@ class Runner {
     if (failure_.any()) return tl::unexpected(failure_.error());
     if (given_up()) return core::input_error("the run was given up; nothing is written");
 
-    if (live_) total_ = std::max(started_, std::min(total_, context_.input.recordings->size()));
+    if (live_ != nullptr) total_ = std::max(started_, std::min(total_, live_->size()));
     report_.frames = started_;
     report_.frames_available = total_;
     report_.stopped = report_.frames < total_;
@@ -164,18 +164,16 @@ class Runner {
     return started_ >= total_ || context_.stop.stop_requested() || failure_.any() || given_up();
   }
 
-  [[nodiscard]] bool given_up() const { return live_ && context_.input.recordings->given_up(); }
+  [[nodiscard]] bool given_up() const { return live_ != nullptr && live_->given_up(); }
 
   /// Sets the final number of frames when a live source has ended.
   void look_at_live() {
-    if (!live_ || ended() || !context_.input.recordings->decided(started_)) return;
-    if (const std::size_t frames = context_.input.recordings->size(); frames <= started_) total_ = frames;
+    if (live_ == nullptr || ended() || !live_->decided(started_)) return;
+    if (const std::size_t frames = live_->size(); frames <= started_) total_ = frames;
   }
   void wait_for_live() {
     constexpr std::chrono::milliseconds kLookUp(20);
-    while (live_ && !ended() && !context_.input.recordings->decided(started_)) {
-      context_.input.recordings->wait_for(started_, kLookUp);
-    }
+    while (live_ != nullptr && !ended() && !live_->decided(started_)) live_->wait_for(started_, kLookUp);
     look_at_live();
   }
 
@@ -186,12 +184,13 @@ class Runner {
 
   TickPtr next(tbb::flow_control& control) {
     look_at_live();
-    if (ended() || (live_ && !context_.input.recordings->decided(started_)) || !pace_->is_due(started_)) {
+    if (ended() || (live_ != nullptr && !live_->decided(started_)) || !pace_->is_due(started_)) {
       control.stop();
       return nullptr;
     }
     auto tick = std::make_shared<Tick>();
     tick->frame = started_++;
+    if (live_ != nullptr) live_->hand_out(tick->frame);
     skip_done();
     tick->outputs.resize(graph_.nodes.size());
     tick->ms.assign(graph_.nodes.size(), std::numeric_limits<float>::quiet_NaN());
@@ -238,8 +237,8 @@ class Runner {
     report_.rss_mb.resize(tick.frame + 1, kUnknown);
     report_.rss_mb.back() = static_cast<float>(rss_mb());
     pace_->done(tick.frame);
-    if (live_) context_.input.recordings->release(tick.frame);
-    if (progress_) progress_(tick.frame + 1, live_ ? 0 : total_);
+    if (live_ != nullptr) live_->release(tick.frame);
+    if (progress_) progress_(tick.frame + 1, live_ != nullptr ? 0 : total_);
   }
 
   core::Result<void> finish(Clock::time_point start) {
@@ -332,9 +331,9 @@ class Runner {
   double pace_hz_;
   std::vector<std::size_t> last_use_;  ///< [node]: the last node that reads from it
   FirstFailure failure_;
-  bool live_ = false;
-  std::size_t total_ = 0;    ///< frames; of a live source more than any until it has ended
-  std::size_t started_ = 0;  ///< frames, or done by an earlier run
+  dataset::LiveFrameSource* live_ = nullptr;  ///< null: frames are those of recordings
+  std::size_t total_ = 0;                     ///< frames; of a live source more than any until it has ended
+  std::size_t started_ = 0;                   ///< frames, or done by an earlier run
   std::optional<Pace> pace_;
   RunReport report_;
 };

@@ -53,7 +53,7 @@ class PosesStage : public Stage {
       Way& way = ways_[static_cast<std::size_t>(robot.number)];
       way.poses = std::move(*poses);
       way.samples = std::make_unique<diagnose::Samples>(
-          robot.camera.color, recordings_->live() ? 0 : recordings_->frames_of(robot.number));
+          robot.camera.color, recordings_->live() != nullptr ? 0 : recordings_->frames_of(robot.number));
     }
     log_ = context.log;
     return {};

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "options/convention_option.hpp"
-#include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/diagnose/signs.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "results/resumed_run.hpp"
@@ -38,13 +37,14 @@ class ReadStage : public Stage {
     source_ = context.input.source;
     log_ = context.log;
     asked_ = &context.asked;
-    if (source_ == nullptr || (source_->size() == 0 && !source_->live()))
+    recordings_ = context.input.recordings;
+    const bool live = recordings_ != nullptr && recordings_->live() != nullptr;
+    if (source_ == nullptr || (source_->size() == 0 && !live))
       return core::input_error("the recording has no frames");
 
-    if (const RobotRecordings* robots = context.input.recordings; robots != nullptr) {
-      recordings_ = robots;
-      for (const RobotInfo& robot : robots->robots()) {
-        const std::size_t frames = robots->live() ? 0 : robots->frames_of(robot.number);
+    if (recordings_ != nullptr) {
+      for (const RobotInfo& robot : recordings_->robots()) {
+        const std::size_t frames = live ? 0 : recordings_->frames_of(robot.number);
         samples_.push_back(std::make_unique<diagnose::Samples>(robot.camera.color, frames));
       }
     }
@@ -116,7 +116,8 @@ class ReadStage : public Stage {
     frames["unreadable"] = unreadable_.load();
     frames["missing"] = source_->missing();
     frames["odometry"] = odometry_.load();
-    if (source_->live()) summary["live"] = live_section(source_->report());
+    if (recordings_ != nullptr && recordings_->live() != nullptr)
+      summary["live"] = live_section(recordings_->live()->report());
     report_signs(signs_, summary);
     summary["unchecked"] = still_ ? Json{"camera", "scale"} : Json{"scale"};
   }

@@ -49,7 +49,7 @@ class StoreStage : public Stage {
     context_ = &context;
     const RobotRecordings* recordings = context.input.recordings;
     whole_ = images_ == Images::kWhole ||
-             (images_ == Images::kAuto && recordings != nullptr && recordings->live());
+             (images_ == Images::kAuto && recordings != nullptr && recordings->live() != nullptr);
     if (context.resumed != nullptr) return take(maps::StoreWriter::resume(context.resumed->store));
     maps::StoreHeader header;
     header.robots = *context.input.robots;

@@ -108,7 +108,8 @@ class TrackStage : public Stage {
     tracked->row = rows_.back();
     if (slam.frame_poses().size() > poses) {
       tracked->pose = slam.frame_poses().back();
-      if (cameras_->may_read_again(io.frame(), number, report.keyframe)) recordings().keep(io.frame());
+      const bool again = cameras_->may_read_again(io.frame(), number, report.keyframe);
+      if (auto* live = context_->input.recordings->live(); again && live != nullptr) live->keep(io.frame());
     }
 
     if (tracked->pose && tracked->pose->tracked) {

@@ -254,7 +254,7 @@ std::size_t SynthSource::round() const { return impl_->round; }
 
 dataset::PairInfo SynthSource::true_info(std::size_t index) const {
   const Stamps& at = impl_->frames.at(index);
-  return {at.color, at.depth, "", ""};
+  return {at.color, at.depth, {}};
 }
 
 dataset::PairInfo SynthSource::info(std::size_t index) const {

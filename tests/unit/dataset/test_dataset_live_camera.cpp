@@ -125,7 +125,10 @@ class LiveCamera : public RecordingTest {
     while (!source_->decided(1'000'000)) source_->wait_for(1'000'000, std::chrono::milliseconds(5));
   }
   /// Says that frames before `index` are being worked on.
-  void hand_out(std::size_t index) const { ASSERT_TRUE(source_->decided(index)); }
+  void hand_out(std::size_t index) const {
+    ASSERT_TRUE(source_->decided(index));
+    source_->hand_out(index);
+  }
   [[nodiscard]] int value_of(std::size_t index) const {
     const auto frame = source_->read(index);
     return frame ? frame->color.at<cv::Vec3b>(5, 5)[0] : -1;
@@ -138,7 +141,7 @@ class LiveCamera : public RecordingTest {
 
   std::shared_ptr<Wire> wire_ = std::make_shared<Wire>();
   core::StopToken stop_;
-  std::unique_ptr<FrameSource> source_;
+  std::unique_ptr<LiveFrameSource> source_;
 };
 
 TEST_F(LiveCamera, FramesAreNumberedAsTheyCome) {

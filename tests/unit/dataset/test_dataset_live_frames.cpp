@@ -94,10 +94,10 @@ TEST(LiveFrames, KeptOnesCanBeReadAgainOthersNot) {
     const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "live_frames";
     std::filesystem::create_directories(folder);
     LiveFrames frames(small_camera());
-    if (on_disk) frames.keep_in(folder);
     for (int i = 0; i < 4; ++i) ASSERT_TRUE(frames.push(frame_at(i, 10 * i)));
     EXPECT_EQ(frames.waiting(), 4U);
     const auto recording = frames.recording();
+    if (on_disk) recording->keep_in(folder);
     for (const std::size_t kept : {1U, 3U}) recording->keep(kept);
     recording->keep(3);
     for (std::size_t done = 1; done < 4; ++done) recording->release(done);
@@ -134,6 +134,25 @@ TEST(LiveFrames, AreReadAsTakenByABetterCamera) {
   EXPECT_DOUBLE_EQ(read->depth_stamp, 1.02);
 }
 
+TEST(LiveFrames, WaitingFramesAreBoundedByBytes) {
+  constexpr std::size_t kFrame = std::size_t{16} * 12 * 5;
+  LiveFrames frames(small_camera(), {"fed", 3 * kFrame});
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_TRUE(frames.wait_for_room(100, 0.0));
+    ASSERT_EQ(problem(frames, frame_at(i, i)), "");
+  }
+  EXPECT_FALSE(frames.wait_for_room(100, 0.0));
+  EXPECT_NE(problem(frames, frame_at(3, 3)).find("3 frames wait"), std::string::npos);
+
+  const auto recording = frames.recording();
+  EXPECT_TRUE(recording->decided(2)) << "a question";
+  EXPECT_FALSE(frames.wait_for_room(100, 0.0)) << "frees nothing";
+  recording->hand_out(0);
+  EXPECT_TRUE(frames.wait_for_room(100, 0.0));
+  EXPECT_EQ(problem(frames, frame_at(3, 3)), "");
+  EXPECT_EQ(recording->size(), 4U);
+}
+
 TEST(LiveFrames, WaitingEndsWithAFrameWithTheEndOrWithAStop) {
   LiveFrames frames(small_camera());
   const auto recording = frames.recording();
@@ -159,6 +178,8 @@ TEST(LiveFrames, WaitingEndsWithAFrameWithTheEndOrWithAStop) {
   EXPECT_FALSE(endless.recording()->is_last(0, stop));
   EXPECT_FALSE(endless.wait_for_room(1, 0.01));
   EXPECT_TRUE(endless.recording()->read(0));
+  EXPECT_FALSE(endless.wait_for_room(1, 0.0));
+  endless.recording()->hand_out(0);
   EXPECT_TRUE(endless.wait_for_room(1, 0.0));
   EXPECT_FALSE(endless.recording()->given_up());
   endless.abandon();
