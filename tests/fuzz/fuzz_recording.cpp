@@ -2,8 +2,8 @@
 // What recordings hold beside images: calibrations of Azure Kinects, arrays of NumPy.
 #include <cmath>
 
-#include "films/azure_kinect.hpp"
 #include "fuzz_target.hpp"
+#include "images/azure_kinect.hpp"
 #include "images/image_decoders.hpp"
 
 using namespace plumbline;

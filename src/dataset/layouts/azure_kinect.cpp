@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Azure Kinect: what k4arecorder writes, one Matroska file.
-#include "films/azure_kinect.hpp"
+#include "images/azure_kinect.hpp"
 
 #include <fmt/format.h>
 

@@ -4,7 +4,7 @@
 // camera_matrix.csv for the video.
 #include <fmt/format.h>
 
-#include "films/film_images.hpp"
+#include "images/film_images.hpp"
 #include "layout.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 

@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "films/azure_kinect.hpp"
+#include "images/azure_kinect.hpp"
 #include "test_dataset_world.hpp"
 
 namespace plumbline::dataset {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "films/azure_kinect.hpp"
+#include "images/azure_kinect.hpp"
 
 #include <fmt/format.h>
 

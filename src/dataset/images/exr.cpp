@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "formats/exr.hpp"
+#include "images/exr.hpp"
 
 #include <ImathBox.h>
 #include <ImfChannelList.h>

@@ -4,7 +4,7 @@
 #include <new>
 #include <opencv2/imgcodecs.hpp>
 
-#include "formats/exr.hpp"
+#include "images/exr.hpp"
 
 namespace plumbline::dataset {
 namespace {

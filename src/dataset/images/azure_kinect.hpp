@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "films/container.hpp"
+#include "images/container.hpp"
 #include "images/image_decoders.hpp"
 #include "images/image_source.hpp"
 #include "plumbline/core/error.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "films/container.hpp"
+#include "images/container.hpp"
 
 #include <memory>
 

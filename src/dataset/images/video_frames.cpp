@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "films/video_frames.hpp"
+#include "images/video_frames.hpp"
 
 #include <fmt/format.h>
 

@@ -3,7 +3,7 @@
 #include <new>
 #include <opencv2/videoio.hpp>
 
-#include "films/video_frames.hpp"
+#include "images/video_frames.hpp"
 
 namespace plumbline::dataset {
 namespace {

@@ -4,8 +4,8 @@
 // Colour in a film, depth in files.
 #include <string>
 
-#include "films/video_frames.hpp"
 #include "images/image_source.hpp"
+#include "images/video_frames.hpp"
 
 namespace plumbline::dataset {
 
