@@ -3,10 +3,10 @@
 // would.
 #include <algorithm>
 
+#include "bag_part/cdr.hpp"
+#include "bag_part/open_bag.hpp"
+#include "bag_part/ros1_messages.hpp"
 #include "bags/images.hpp"
-#include "bags/part/cdr.hpp"
-#include "bags/part/open_bag.hpp"
-#include "bags/part/ros1_messages.hpp"
 #include "fuzz_target.hpp"
 
 using namespace plumbline;

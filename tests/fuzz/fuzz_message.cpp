@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Messages of bags: the first byte chooses the type and how it is serialized; or RVL, whose size is in two
 // bytes more.
+#include "bag_part/cdr.hpp"
+#include "bag_part/ros1_messages.hpp"
 #include "bags/images.hpp"
-#include "bags/part/cdr.hpp"
-#include "bags/part/ros1_messages.hpp"
 #include "bags/rvl.hpp"
 #include "fuzz_target.hpp"
 

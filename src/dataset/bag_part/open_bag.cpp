@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bags/part/open_bag.hpp"
+#include "bag_part/open_bag.hpp"
 
 #include <fmt/format.h>
 
@@ -7,11 +7,11 @@
 #include <string_view>
 #include <utility>
 
-#include "bags/part/binary_file.hpp"
-#include "bags/part/compression.hpp"
-#include "bags/part/formats/db3.hpp"
-#include "bags/part/formats/mcap.hpp"
-#include "bags/part/formats/ros1_bag.hpp"
+#include "bag_part/binary_file.hpp"
+#include "bag_part/compression.hpp"
+#include "bag_part/db3.hpp"
+#include "bag_part/mcap.hpp"
+#include "bag_part/ros1_bag.hpp"
 
 namespace plumbline::dataset {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bags/part/formats/mcap_writer.hpp"
+#include "bag_part/mcap_writer.hpp"
 
 #include <libdeflate.h>
 #include <zstd.h>
@@ -9,9 +9,9 @@
 #include <map>
 #include <utility>
 
-#include "bags/part/cdr.hpp"
-#include "bags/part/formats/mcap_records.hpp"
-#include "bags/part/message_definitions.hpp"
+#include "bag_part/cdr.hpp"
+#include "bag_part/mcap_records.hpp"
+#include "bag_part/message_definitions.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/core/version.hpp"
 

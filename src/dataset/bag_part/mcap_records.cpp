@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bags/part/formats/mcap_records.hpp"
+#include "bag_part/mcap_records.hpp"
 
 #include <algorithm>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bags/part/formats/db3.hpp"
+#include "bag_part/db3.hpp"
 
 #include <fmt/format.h>
 #include <sqlite3.h>
@@ -9,7 +9,7 @@
 #include <mutex>
 #include <utility>
 
-#include "bags/part/packed_message.hpp"
+#include "bag_part/packed_message.hpp"
 
 namespace plumbline::dataset {
 namespace {

@@ -2,7 +2,7 @@
 #pragma once
 
 // Messages that rosbag2 compressed one by one: zstd frames instead of their bytes.
-#include "bags/part/compression.hpp"
+#include "bag_part/compression.hpp"
 
 namespace plumbline::dataset {
 

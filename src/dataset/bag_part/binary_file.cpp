@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bags/part/binary_file.hpp"
+#include "bag_part/binary_file.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>

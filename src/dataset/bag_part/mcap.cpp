@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bags/part/formats/mcap.hpp"
+#include "bag_part/mcap.hpp"
 
 #include <fmt/format.h>
 
@@ -10,8 +10,8 @@
 #include <tuple>
 #include <utility>
 
-#include "bags/part/formats/mcap_records.hpp"
-#include "bags/part/packed_message.hpp"
+#include "bag_part/mcap_records.hpp"
+#include "bag_part/packed_message.hpp"
 
 namespace plumbline::dataset {
 namespace {

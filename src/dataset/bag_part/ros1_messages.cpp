@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bags/part/ros1_messages.hpp"
+#include "bag_part/ros1_messages.hpp"
 
 #include <array>
 #include <cstring>

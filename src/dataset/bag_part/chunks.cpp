@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bags/part/chunks.hpp"
+#include "bag_part/chunks.hpp"
 
 #include <libdeflate.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bags/part/compression.hpp"
+#include "bag_part/compression.hpp"
 
 #include <bzlib.h>
 #include <fcntl.h>

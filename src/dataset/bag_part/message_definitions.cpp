@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bags/part/message_definitions.hpp"
+#include "bag_part/message_definitions.hpp"
 
 namespace plumbline::dataset {
 namespace {

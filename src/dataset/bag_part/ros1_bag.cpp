@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bags/part/formats/ros1_bag.hpp"
+#include "bag_part/ros1_bag.hpp"
 
 #include <fmt/format.h>
 
@@ -12,7 +12,7 @@
 #include <tuple>
 #include <utility>
 
-#include "bags/part/chunks.hpp"
+#include "bag_part/chunks.hpp"
 
 namespace plumbline::dataset {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bags/part/cdr.hpp"
+#include "bag_part/cdr.hpp"
 
 #include <dds/ddsi/ddsi_cdrstream.h>
 #include <dds/ddsi/ddsi_xqos.h>

@@ -9,8 +9,8 @@
 #include <string>
 #include <utility>
 
-#include "bags/part/binary_file.hpp"
-#include "bags/part/compression.hpp"
+#include "bag_part/binary_file.hpp"
+#include "bag_part/compression.hpp"
 
 namespace plumbline::dataset {
 

@@ -9,7 +9,7 @@
 #include <optional>
 #include <string>
 
-#include "bags/part/chunks.hpp"
+#include "bag_part/chunks.hpp"
 
 namespace plumbline::dataset {
 
