@@ -217,6 +217,27 @@ core::Result<TrajectoryReading> recording_poses(const fs::path& folder, core::Lo
   return reading;
 }
 
+namespace {
+
+/// The frames that a recording lists, and what else it says, with the tables of a body beside it.
+core::Result<Layout> read_with_body(const fs::path& folder, const OpenOptions& options,
+                                    const LayoutOptions& layout_options, core::Log& log) {
+  auto layout = read_any(folder, options, layout_options, log);
+  if (!layout && is_result(folder)) {
+    return core::input_error(fmt::format(
+        "{}: is a result of plumbline map, not a recording; give the recording that it was made of",
+        folder.string()));
+  }
+  if (!layout) return layout;
+
+  layout->folder = folder;
+  if (layout_options.body && layout->body == nullptr && is_folder(folder))
+    layout->body = read_body_tables(folder, !layout->truth_is_odometry, log);
+  return layout;
+}
+
+}  // namespace
+
 core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder, const OpenOptions& options,
                                                           core::Log& log) {
   if (folder.empty()) return core::usage_error("the path of the recording is empty");
@@ -238,17 +259,8 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
     layout_options.depth_delay_s = (*chosen)->reading.camera.depth_delay_s;
   }
 
-  // The frames that it lists, and what else it says.
-  auto layout = read_any(folder, options, layout_options, log);
-  if (!layout && is_result(folder)) {
-    return core::input_error(fmt::format(
-        "{}: is a result of plumbline map, not a recording; give the recording that it was made of",
-        folder.string()));
-  }
+  auto layout = read_with_body(folder, options, layout_options, log);
   if (!layout) return tl::unexpected(layout.error());
-  layout->folder = folder;
-  if (layout_options.body && layout->body == nullptr && is_folder(folder))
-    layout->body = read_body_tables(folder, !layout->truth_is_odometry, log);
 
   // Frames with stamps of their own, whose files exist.
   round_stamps(layout->pairs);
