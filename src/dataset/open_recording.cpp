@@ -44,6 +44,8 @@ std::string recordings_inside(const fs::path& folder) {
 core::Result<Layout> read_layout(const fs::path& folder, const std::string& format,
                                  const LayoutOptions& options, core::Log& log) {
   const bool any = format.empty() || format == "auto";
+
+  // A named format is not guessed
   for (const LayoutFormat* known : layout_formats()) {
     if (!any && format == known->name) return known->read(folder, options, log);
   }
@@ -52,7 +54,10 @@ core::Result<Layout> read_layout(const fs::path& folder, const std::string& form
         fmt::format("format '{}' is not known (allowed: {})", format, fmt::join(layout_names(), ", ")));
   }
 
+  // Without a name the files tell the layout
   if (const LayoutFormat* found = layout_of(folder)) return found->read(folder, options, log);
+
+  // The folder may hold several recordings
   const std::string inside = recordings_inside(folder);
   if (!inside.empty()) {
     return core::input_error(
@@ -192,6 +197,7 @@ bool is_recording_file(const fs::path& file) {
 }
 
 core::Result<TrajectoryReading> recording_poses(const fs::path& folder, core::Log& log) {
+  // Numbered layouts need the camera's rate
   const auto chosen = choose_camera(folder, {}, log);
   LayoutOptions options;
   if (chosen && *chosen) options.fps = (*chosen)->reading.camera.fps;
@@ -208,6 +214,8 @@ core::Result<TrajectoryReading> recording_poses(const fs::path& folder, core::Lo
   reading.format = layout->format;
 
   for (const geometry::StampedPose& pose : reading.poses) reading.rows.push_back(pose.stamp);
+
+  // Odometry must not pass for ground truth
   if (layout->truth_is_odometry) {
     reading.notes.push_back(
         fmt::format("the {} poses to compare with are those of the recorder's own odometry, not ground truth",

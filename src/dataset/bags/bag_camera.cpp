@@ -89,6 +89,7 @@ tl::expected<InfoPinholes, std::string> pinholes_of(const CameraInfoMessage& inf
   if (!size_ok(info.width) || !size_ok(info.height))
     return tl::unexpected(fmt::format("says {} x {} pixels", info.width, info.height));
 
+  // Binning and region shrink the stored image
   const RegionMessage& roi = info.roi;
   const auto x = complete_axis({info.width, roi.x_offset, roi.width, info.binning_x});
   const auto y = complete_axis({info.height, roi.y_offset, roi.height, info.binning_y});
@@ -100,6 +101,7 @@ tl::expected<InfoPinholes, std::string> pinholes_of(const CameraInfoMessage& inf
                     info.width, info.height));
   }
 
+  // P belongs to rectified images, K to raw ones
   const double fx = by_p ? info.p[0] : info.k[0];
   const double fy = by_p ? info.p[5] : info.k[4];
   const double cx = by_p ? info.p[2] : info.k[2];
@@ -207,6 +209,7 @@ class Transforms {
   std::map<std::string, std::pair<std::string, Rigid3>> parents_;
 };
 
+/// The transforms in the first messages of both topics of ROS.
 Transforms read_all_transforms(const BagSurvey& survey) {
   Transforms transforms;
   for (const char* name : {"/tf_static", "/tf"}) {  // ROS 1's publishers of fixed frames use /tf
@@ -254,6 +257,7 @@ double realsense_depth_scale(const BagSurvey& survey, const std::string& stream)
 
 std::optional<Rigid3> color_from_depth(const BagSurvey& survey, const ChosenTopics& topics,
                                        const InfoCamera& color, const InfoCamera& depth) {
+  // RealSense's own bags have no /tf_static
   const std::string color_stream = realsense_stream(topics.color.topic->topic.name);
   const std::string depth_stream = realsense_stream(topics.depth.topic->topic.name);
   if (!color_stream.empty() && !depth_stream.empty()) {
@@ -262,6 +266,8 @@ std::optional<Rigid3> color_from_depth(const BagSurvey& survey, const ChosenTopi
     if (color_from_reference && depth_from_reference)
       return *color_from_reference * depth_from_reference->inverse();
   }
+
+  // Images of one frame need no transform
   if (!color.frame.empty() && color.frame == depth.frame) return Rigid3();
   return read_all_transforms(survey).between(color.frame, depth.frame);
 }
@@ -271,7 +277,7 @@ bool same_pixels(const sensor::Pinhole& a, const sensor::Pinhole& b) {
          a.cy == b.cy;
 }
 
-/// Adds a depth camera of its own if depth is not registered to colour.
+/// Adds a depth camera if depth is not registered to colour.
 core::Result<void> add_depth_camera(const BagSurvey& survey, const ChosenTopics& topics,
                                     const InfoCamera& color, const InfoCamera& depth,
                                     sensor::CameraReading& reading) {
@@ -281,6 +287,7 @@ core::Result<void> add_depth_camera(const BagSurvey& survey, const ChosenTopics&
                        depth_name.find("registered") != std::string::npos;
   if (same && (by_name || color.frame == depth.frame)) return {};
 
+  // Depth of another camera needs the transform
   const auto motion = color_from_depth(survey, topics, color, depth);
   if (!motion) {
     return core::usage_error(
@@ -290,6 +297,7 @@ core::Result<void> add_depth_camera(const BagSurvey& survey, const ChosenTopics&
                     survey.path, topics.color.topic->topic.name, color.frame, depth_name, depth.frame));
   }
 
+  // Equal cameras in one place are registered
   const bool nothing_moves = motion->rotation.isIdentity(kNothing) && motion->translation.isZero(kNothing);
   if (same && nothing_moves) return {};
   reading.camera.color_from_depth = *motion;
@@ -309,6 +317,7 @@ core::Result<std::optional<sensor::CameraReading>> bag_camera(const BagSurvey& s
   if (!color) return tl::unexpected(color.error());
   if (!*color) return std::nullopt;
 
+  // Intrinsics and distortion of the colour camera
   sensor::CameraReading reading;
   reading.program = "ROS";
   reading.camera.name = topics.info.topic->topic.name;
@@ -317,9 +326,11 @@ core::Result<std::optional<sensor::CameraReading>> bag_camera(const BagSurvey& s
   reading.camera.distortion = (*color)->lens.k;
   reading.camera.depth_scale = kMillimetres;
 
+  // RealSense's own bags name the depth unit
   const std::string stream = realsense_stream(topics.depth.topic->topic.name);
   if (!stream.empty()) reading.camera.depth_scale = realsense_depth_scale(survey, stream);
 
+  // Depth may come from a second camera
   const auto depth = read_info(survey, topics.depth_info, *topics.depth.topic, log);
   if (!depth) return tl::unexpected(depth.error());
   if (*depth) {
@@ -327,6 +338,7 @@ core::Result<std::optional<sensor::CameraReading>> bag_camera(const BagSurvey& s
       return tl::unexpected(added.error());
   }
 
+  // An uncalibrated camera is reported, not used
   if (const std::string wrong = sensor::camera_problem(reading.camera); !wrong.empty()) {
     return core::input_error(fmt::format("{}: {}: {}; name a camera file with --camera", survey.path,
                                          topics.info.topic->topic.name, wrong));

@@ -104,12 +104,15 @@ core::Result<void> clear_leftover(const fs::path& partial, bool replace) {
   std::error_code ec;
   if (!fs::exists(partial, ec)) return {};
   const bool complete = is_copy(partial, false);
+
+  // A complete copy is dropped only with --force
   if (complete && !replace) {
     return core::usage_error(fmt::format(
         "{}: holds a complete copy that was not moved to its place; rename it, or --force drops it",
         partial.string()));
   }
 
+  // Folders that are not leftovers stay untouched
   const bool unfinished =
       std::any_of(fs::directory_iterator(partial, ec), fs::directory_iterator(),
                   [](const fs::directory_entry& entry) { return is_unfinished_list(entry.path()); });
@@ -177,6 +180,7 @@ core::Result<ConvertSummary> copy_frames(const FrameSource& source, CopyTarget& 
       break;
     }
 
+    // Stamps as measured, without the delay of depth
     const PairInfo info = source.info(i);
     const auto pair = source.stored(i);
     core::Result<void> added;
@@ -186,6 +190,7 @@ core::Result<ConvertSummary> copy_frames(const FrameSource& source, CopyTarget& 
                          nanoseconds(info.depth_stamp - source.camera().depth_delay_s), *pair);
     }
 
+    // Unreadable frames are skipped; a full disk ends the copy
     const core::Error* problem = !pair ? &pair.error() : !added ? &added.error() : nullptr;
     if (problem != nullptr && problem->kind != core::ErrorKind::kInput) return tl::unexpected(*problem);
     if (problem == nullptr) {
@@ -197,6 +202,7 @@ core::Result<ConvertSummary> copy_frames(const FrameSource& source, CopyTarget& 
     if (options.progress) options.progress(i + 1);
   }
 
+  // A copy needs at least one frame
   if (summary.written > 0) return summary;
   return core::input_error(
       fmt::format("{}: no frame can be copied; the first: {}", source.name(), first_error));
@@ -213,6 +219,8 @@ std::int64_t nanoseconds(double seconds) {
 core::Result<ConvertSummary> convert_recording(const FrameSource& source, const fs::path& out,
                                                const ConvertOptions& options, core::Log& log) {
   const bool file = out.extension() == ".mcap";
+
+  // The copy is moved to its place when complete
   fs::path folder = out.has_filename() ? out : out.parent_path();  // where it is first written
   folder += ".partial";
   if (auto free = check_place(out, folder, file, options.replace); !free) return tl::unexpected(free.error());
@@ -222,6 +230,8 @@ core::Result<ConvertSummary> convert_recording(const FrameSource& source, const 
 
   auto summary = copy_frames(source, **target, options, log);
   core::Result<void> done;
+
+  // The recorder's poses are not ground truth
   const bool odometry = source.truth_is_odometry();
   if (odometry)
     log.warning("the poses that the recorder kept are not in the copy: it is tracked without them");
@@ -230,6 +240,7 @@ core::Result<ConvertSummary> convert_recording(const FrameSource& source, const 
   if (summary && file) done = make_room_again(out, true, options.replace, "");
   if (summary && done) done = (*target)->finish(odometry ? std::nullopt : source.truth());
 
+  // A failed copy leaves nothing
   if (!summary || !done) {
     target->reset();
     const auto removed = file ? core::Result<void>() : core::remove_own_files(folder, kPartsOfACopy);
@@ -237,6 +248,7 @@ core::Result<ConvertSummary> convert_recording(const FrameSource& source, const 
     return tl::unexpected(summary ? done.error() : summary.error());
   }
 
+  // A folder appears complete
   if (!file) done = put_in_place(folder, out, options.replace);
   if (!done) return tl::unexpected(done.error());
   return summary;

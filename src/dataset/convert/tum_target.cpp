@@ -45,6 +45,8 @@ class TumTarget final : public CopyTarget {
     if (truth) {
       if (auto written = write_trajectory(folder_ / "groundtruth.txt", *truth); !written) return written;
     }
+
+    // The list of pairs completes the folder
     return list_.commit();
   }
 

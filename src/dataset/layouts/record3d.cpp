@@ -59,6 +59,7 @@ std::optional<geometry::Rigid3> record3d_pose(const json& row) {
 }
 
 core::Result<sensor::CameraReading> record3d_camera(const fs::path& file, const json& metadata) {
+  // A camera needs K and the image's size
   const auto k =
       metadata.is_object() && metadata.contains("K") ? numbers_of_array<9>(metadata["K"]) : std::nullopt;
   const auto width = json_number(metadata, "w");
@@ -71,6 +72,7 @@ core::Result<sensor::CameraReading> record3d_camera(const fs::path& file, const 
   sensor::CameraReading reading;
   reading.program = "Record3D (metadata.json)";
 
+  // K is stored column by column
   sensor::Camera& camera = reading.camera;
   camera.name = "record3d";
   camera.color = {static_cast<int>(std::clamp(*width, 0.0, 1e5)),
@@ -81,6 +83,7 @@ core::Result<sensor::CameraReading> record3d_camera(const fs::path& file, const 
                   (*k)[7]};
   camera.fps = json_number(metadata, "fps").value_or(30.0);
 
+  // Implausible numbers are reported, not used
   if (const std::string wrong = sensor::camera_problem(camera); !wrong.empty())
     return core::input_error(fmt::format("{}: {}", file.string(), wrong));
   return reading;

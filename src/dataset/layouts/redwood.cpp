@@ -55,11 +55,13 @@ geometry::Trajectory read_log(const fs::path& file, const std::vector<PairInfo>&
       }
     }
 
+    // A pose is rigid up to rounding
     const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
     const double error =
         (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
     good = good && matrix.allFinite() && error < 0.01;
 
+    // The truth ends at the first damaged pose
     if (!good) {
       log.warning(fmt::format("{}:{}: is not the pose of a pair; the truth ends here", file.string(),
                               (*lines)[i].number));

@@ -39,6 +39,8 @@ core::Result<Layout> read_replica(const fs::path& folder, const LayoutOptions& o
         fmt::format("{}: no number is in both names, frame000000.jpg ({} of these) and depth000000.png ({})",
                     (folder / "results").string(), color.size(), depth.size()));
   }
+
+  // Rows of the truth are numbered like images
   layout.truth = replica_truth(folder / "traj.txt", options.fps, log);
   return layout;
 }

@@ -20,6 +20,7 @@ geometry::Trajectory scannet_truth(const fs::path& folder, const Layout& layout,
   geometry::Trajectory truth;
   std::size_t left_out = 0;
 
+  // Each colour image has a file with its pose
   for (const PairInfo& pair : layout.pairs) {
     const fs::path file = folder / "pose" / (layout.images->file(pair.color).stem().string() + ".txt");
     if (!is_file(file)) continue;
@@ -30,6 +31,7 @@ geometry::Trajectory scannet_truth(const fs::path& folder, const Layout& layout,
     }
   }
 
+  // ScanNet marks lost poses as infinite
   if (left_out > 0) {
     log.warning(
         fmt::format("{}: {} of {} poses are not finite or no rigid motion, and are left out of the truth",
@@ -47,6 +49,8 @@ core::Result<Layout> read_scannet(const fs::path& folder, const LayoutOptions& o
     return core::input_error(fmt::format("{}: no number is in both color/ ({} images) and depth/ ({})",
                                          folder.string(), color.size(), depth.size()));
   }
+
+  // Images without a partner are reported
   const std::size_t unmatched = color.size() + depth.size() - 2 * layout.pairs.size();
   if (unmatched > 0)
     log.warning(fmt::format("{}: {} images have no partner and are skipped", folder.string(), unmatched));

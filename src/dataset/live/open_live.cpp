@@ -54,6 +54,8 @@ core::Result<void> fits_live(const std::string& address, const OpenOptions& opti
                       : options.format != "auto" && !options.format.empty() ? "--format"
                       : options.poses == PoseUse::kGiven                    ? "--poses given"
                                                                             : nullptr;
+
+  // The file to record is checked before the run
   if (wrong == nullptr)
     return options.live.record.empty() ? core::Result<void>()
                                        : LiveRecord::check(options.live.record, options.live.replace);
@@ -210,6 +212,8 @@ core::Result<std::string> live_to_text(const std::string& address, MessageStream
                                        const OpenOptions& options) {
   const auto found = survey_stream(address, stream, options.topics, options.live.patience, options.live.stop);
   std::string text = fmt::format("live: {}\n{}", address, published_text(stream.topics()));
+
+  // Topics without images help to find the error
   if (!found) {
     if (stream.topics().empty()) return tl::unexpected(found.error());
     return text + "note: " + found.error().message + "\n";

@@ -251,6 +251,8 @@ void LiveMap::Impl::end() {
   }
   wake.notify_all();
   thread.join();
+
+  // The last clouds are sent without a limit
   at_once = std::numeric_limits<std::size_t>::max();
   look();
   server.send(R"({"done":true})", "done");
@@ -272,6 +274,8 @@ core::Result<std::unique_ptr<LiveMap>> LiveMap::start(const PageServerOptions& o
   std::unique_ptr<LiveMap> live(new LiveMap);
   live->impl_ = std::make_unique<Impl>(std::move(*server));
   live->impl_->output = output;
+
+  // The thread reads all that is set above
   live->impl_->thread = std::thread([impl = live->impl_.get()] { impl->follow(); });
   return live;
 }

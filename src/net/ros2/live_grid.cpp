@@ -30,6 +30,7 @@ void LiveGrid::add(double stamp, const geometry::Rigid3& map_from_camera,
   scan.yaw = yaw_of(map_from_camera);
   scan.beams = beams_of(scan, points);
 
+  // A scan of that time is already drawn
   const auto [at, is_new] = scans_.emplace(stamp, std::move(scan));
   if (!is_new) return;
   make_room(at->second);
@@ -44,10 +45,13 @@ void LiveGrid::move(const geometry::Trajectory& map_from_camera) {
     Scan& scan = found->second;
     const Eigen::Vector2d at = pose.world_from_camera.translation.head<2>();
     const double yaw = yaw_of(pose.world_from_camera);
+
+    // Small corrections do not change cells
     if ((at - scan.at).norm() < 0.5 * options_.resolution_m &&
         std::abs(turn_between(yaw, scan.yaw)) < kLeastTurn)
       continue;
 
+    // Cells forget the scan at its old place
     draw(scan, -1);
     scan.at = at;
     scan.yaw = yaw;

@@ -114,6 +114,8 @@ class Ros2Publisher final : public pipeline::RunObserver {
                const Rigid3& odometry_from_camera) override {
     const Rigid3 map_from_body = published_from_map_ * map_from_camera * body_of_camera().inverse();
     Rigid3 odometry_from_body = published_from_map_ * odometry_from_camera * body_of_camera().inverse();
+
+    // Two publishers of one transform would conflict
     const bool other = another_publishes();
     if (other) {
       const auto theirs = others_->base_at(stamp);
@@ -121,11 +123,14 @@ class Ros2Publisher final : public pipeline::RunObserver {
       odometry_from_body = *theirs;
     }
 
+    // Drift is corrected between map and odom
     const Rigid3 map_from_odometry = map_from_body * odometry_from_body.inverse();
     std::vector<dataset::NamedTransform> transforms = {
         {frame(robot, frames_.map), frame(robot, frames_.odom), map_from_odometry}};
     if (!other)
       transforms.push_back({frame(robot, frames_.odom), frame(robot, body_name()), odometry_from_body});
+
+    // The listener ignores this program's transforms
     if (others_ != nullptr && !other) others_->sends(stamp);
     post_transforms(std::move(transforms), stamp);
 
@@ -149,6 +154,7 @@ class Ros2Publisher final : public pipeline::RunObserver {
     post_path(robot, path, published_from_map_, false);
     if (frames_.base.empty()) return;
 
+    // Corrected poses move earlier scans
     const std::lock_guard lock(mutex_);
     LiveGrid& grid = grid_of(robot);
     grid.move(moved(path, published_from_map_));
@@ -179,6 +185,8 @@ class Ros2Publisher final : public pipeline::RunObserver {
       stamp = std::max(stamp, paths[r].back().stamp);
       post_path(static_cast<std::int32_t>(r), paths[r], published_from_map_, true);
     }
+
+    // The final cloud belongs to all robots
     post_points(shared_topic("map"), shared_frame(), stamp,
                 packed(cloud, published_from_map_ * map_from_cloud), true);
   }
@@ -358,6 +366,8 @@ core::Result<PublishedFrames> parse_published_frames(const std::string& text) {
     const std::size_t equals = word.find('=');
     const std::string key = word.substr(0, equals);
     const auto found = names.find(key);
+
+    // Misspelt and repeated names are refused
     if (equals == std::string::npos || equals + 1 == word.size() || found == names.end() ||
         !seen.insert(key).second) {
       return core::usage_error(
@@ -376,6 +386,8 @@ core::Result<std::shared_ptr<pipeline::RunObserver>> open_ros2_publisher(const s
                                                                          core::Log& log) {
   const auto parsed = parse_ros2_address(address);
   if (!parsed) return tl::unexpected(parsed.error());
+
+  // Published topics have fixed names
   if (parsed->topics.any()) {
     return core::usage_error(
         fmt::format("--publish {}: topics are not named here; they are /plumbline/path and others", address));
@@ -383,11 +395,14 @@ core::Result<std::shared_ptr<pipeline::RunObserver>> open_ros2_publisher(const s
   auto sink = open_ros2_sink(*parsed);
   if (!sink) return tl::unexpected(sink.error());
 
+  // Without a base the camera is the body
   PublishedFrames named = frames;
   Rigid3 body = body_from_optical();
   std::unique_ptr<TransformListener> others;
   if (!named.base.empty()) {
     if (named.camera.empty()) named.camera = "camera_color_optical_frame";
+
+    // Other programs publish the camera's mount
     auto stream = open_ros2_stream(*parsed);
     if (!stream) return tl::unexpected(stream.error());
     others = std::make_unique<TransformListener>(std::move(*stream), named.base);
