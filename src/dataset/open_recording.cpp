@@ -140,12 +140,15 @@ core::Result<ListedFrames> leave_out_missing(const std::string& folder, Layout& 
     if (first.empty()) first = missing;
   }
 
+  // At least one frame must be complete
   const std::size_t all = layout.pairs.size();
   layout.pairs = std::move(there);
   if (layout.pairs.empty()) {
     return core::input_error(fmt::format(
         "{}: none of its {} frames has both its files; the first that is missing: {}", folder, all, first));
   }
+
+  // Frames without both files are reported
   if (layout.pairs.size() < all) {
     log.warning(
         fmt::format("{}: {} of {} frames are missing and left out: their files do not exist (the first: {})",
@@ -246,7 +249,7 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
     layout_options.depth_delay_s = (*chosen)->reading.camera.depth_delay_s;
   }
 
-  // The frames that it lists, and what else it says.
+  // The frames that the recording lists, and its other data
   auto layout = read_any(folder, options, layout_options, log);
   if (!layout && is_result(folder)) {
     return core::input_error(fmt::format(
@@ -254,11 +257,13 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
         folder.string()));
   }
   if (!layout) return tl::unexpected(layout.error());
+
+  // A folder may also hold tables of wheels and IMU
   layout->folder = folder;
   if (layout_options.body && layout->body == nullptr && is_folder(folder))
     layout->body = read_body_tables(folder, !layout->truth_is_odometry, log);
 
-  // Frames with stamps of their own, whose files exist.
+  // Frames with different stamps, whose files exist
   round_stamps(layout->pairs);
   drop_same_stamps(folder.string(), *layout, log);
   const auto listed = leave_out_missing(folder.string(), *layout, log);

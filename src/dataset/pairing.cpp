@@ -103,6 +103,8 @@ core::Result<void> check_files(const std::string& list, const std::vector<Stampe
         fmt::format("{}:{}: names {}, which cannot be reached: no permission for its folder", list,
                     first.line, first.file));
   }
+
+  // If all files are missing, their place is wrong
   return core::input_error(
       fmt::format("{}:{}: names {}, which does not exist, and none of its {} files does; copy the image "
                   "folder beside the list or correct the list",

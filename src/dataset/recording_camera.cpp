@@ -149,6 +149,8 @@ std::optional<sensor::Camera> guessed_camera(const Layout& layout) {
                     device.focal_px,
                     0.5 * (size->width - 1),
                     0.5 * (size->height - 1)};
+
+    // Depth in the usual unit of the layout
     camera.depth_scale = usual_depth_scale(layout);
     camera.guess = true;
     return camera;

@@ -10,6 +10,7 @@
 #include "plumbline/core/numbers.hpp"
 
 namespace plumbline::dataset {
+
 /// Positions spread evenly, with the first and the last.
 std::vector<std::size_t> spread(std::size_t count, std::size_t samples) {
   std::vector<std::size_t> positions;

@@ -170,7 +170,7 @@ DecodedMessage<std::vector<TransformMessage>> read_transforms(const Bytes& bytes
     const auto& from = sample->transforms._buffer[i];
     const geometry::Rigid3 motion = rigid_of(from.transform);
 
-    // Damaged transforms are left out
+    // Transforms that are not finite are left out
     if (!is_motion(motion)) continue;
     transforms.push_back({text_of(from.header.frame_id), text_of(from.child_frame_id), motion,
                           nanoseconds_of(from.header.stamp)});
@@ -371,6 +371,8 @@ Bytes encode_cdr(const CloudMessage& message) {
   cloud.header = header_from(message.header.stamp_ns, message.header.frame_id);
   cloud.height = 1;
   cloud.width = message.points;
+
+  // Fields and points are borrowed
   cloud.fields._length = cloud.fields._maximum = static_cast<std::uint32_t>(fields.size());
   cloud.fields._buffer = fields.data();
   cloud.point_step = kPointBytes;

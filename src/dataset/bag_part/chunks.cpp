@@ -15,6 +15,8 @@ tl::expected<Bytes, std::string> read_chunk(const BinaryFile& file, const Chunk&
   Bytes packed(static_cast<std::size_t>(chunk.data_size));
   if (!file.read(chunk.data_at, packed.data(), packed.size()))
     return tl::unexpected<std::string>("cannot be read");
+
+  // Uncompressed data are used as they are
   Bytes plain;
   if (chunk.compression == Compression::kNone) {
     plain = std::move(packed);

@@ -113,6 +113,8 @@ class Bzip2Inflater final : public Inflater {
     while (done < size && !damaged_) {
       const auto room = static_cast<unsigned>(std::min(kStep, size - done));
       const auto fed = static_cast<unsigned>(std::min(kStep, left_));
+
+      // bzip2 counts down the bytes of both buffers
       stream_.next_out = reinterpret_cast<char*>(to + done);
       stream_.avail_out = room;
       stream_.avail_in = fed;

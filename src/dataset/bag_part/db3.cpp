@@ -135,7 +135,7 @@ core::Result<void> Db3File::scan(const Visit& visit) {
     const auto topic = topic_of_id_.find(sqlite3_column_int64(rows.get(), 1));
     const std::int64_t size = sqlite3_column_int64(rows.get(), 3);
 
-    // Rows of unknown topics and damaged sizes
+    // Unknown topics and damaged sizes are skipped
     if (topic == topic_of_id_.end() || size < 0 || size > static_cast<std::int64_t>(kMostMessageBytes))
       continue;
 

@@ -110,6 +110,8 @@ void McapFile::scan_record(McapOpcode opcode, std::uint64_t at, std::uint64_t si
       next += count;
       return there;
     };
+
+    // This message is outside any chunk
     scan_message(get, {at + kMessageHead, kNoChunk, static_cast<std::uint32_t>(size - kMessageHead), 0},
                  visit);
   } else if (opcode == McapOpcode::kSchema || opcode == McapOpcode::kChannel ||
@@ -132,6 +134,8 @@ void McapFile::scan_chunk(std::uint64_t at, std::uint64_t size, const Visit& vis
     wrong = "is too large";
   } else {
     ChunkCursor records(file_, *chunk);
+
+    // Records before the damage are visited
     if (!scan_records(records, *chunk, at, visit)) wrong = "cannot be unpacked or does not hold records";
   }
 
@@ -162,6 +166,8 @@ bool McapFile::scan_records(ChunkCursor& records, const Chunk& chunk, std::uint6
       if (!scan_message(get, {at, begin + kMessageHead, payload, 0}, visit)) return false;
     } else if (opcode == McapOpcode::kSchema || opcode == McapOpcode::kChannel) {
       if (size > kMostRecordBytes) return false;
+
+      // Definitions are unpacked completely
       Bytes content(static_cast<std::size_t>(size));
       if (!records.get(content.data(), content.size())) return false;
       add_definition(opcode, content);

@@ -152,6 +152,8 @@ std::uint16_t McapWriter::channel_of(const std::string& topic, const std::string
     append(record(McapOpcode::kSchema,
                   RecordFields().number(id).text(type).text("ros2msg").text(message_definition(type))));
   }
+
+  // Channels are numbered by their first messages
   const auto id = static_cast<std::uint16_t>(channels_.size());
   channels_[topic] = id;
   append(

@@ -141,9 +141,9 @@ core::Result<void> Ros1Bag::scan(const Visit& visit) {
     return true;
   };
 
+  // Records up to the first that is cut off
   std::uint64_t begin = at;
   bool whole = true;
-
   while (whole && (begin = at) < file_.size()) {
     const auto record = next_record(get);
     whole = record && record->data_size <= file_.size() - at;
@@ -176,6 +176,7 @@ core::Result<void> Ros1Bag::scan(const Visit& visit) {
     at = data + record->data_size;
   }
 
+  // Records before the damage are used
   if (!whole) {
     notes_.push_back(fmt::format("{}: is cut off or damaged at byte {} of {}; what is before is used", shown_,
                                  begin, file_.size()));

@@ -106,6 +106,8 @@ tl::expected<InfoPinholes, std::string> pinholes_of(const CameraInfoMessage& inf
   const double fy = by_p ? info.p[5] : info.k[4];
   const double cx = by_p ? info.p[2] : info.k[2];
   const double cy = by_p ? info.p[6] : info.k[5];
+
+  // A binned pixel is centred between its originals
   const auto pixels = [](std::uint32_t size) { return static_cast<int>(size); };
   const auto middle = [](double c, const InfoAxis& axis) {
     return axis.binning == 1 ? c - axis.offset : (c - axis.offset + 0.5) / axis.binning - 0.5;
@@ -155,6 +157,8 @@ core::Result<std::optional<InfoCamera>> read_info(const BagSurvey& survey, const
   const auto pinholes = pinholes_of(*message, by_p);
   if (!pinholes) return wrong(pinholes.error());
   InfoCamera camera{pinholes->image, {}, frame_name(message->header.frame_id)};
+
+  // Some drivers announce a region but send full images
   if (pinholes->differ()) {
     const cv::Size full(pinholes->full.width, pinholes->full.height);
     if (image_size(survey, images) == full) {
@@ -165,8 +169,9 @@ core::Result<std::optional<InfoCamera>> read_info(const BagSurvey& survey, const
                       place, full.width, full.height));
     }
   }
-  if (rectified) return camera;
 
+  // Rectified images have no distortion
+  if (rectified) return camera;
   const auto lens = lens_of(*message);
   if (!lens) return wrong(lens.error());
   camera.lens = *lens;

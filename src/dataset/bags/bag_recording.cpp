@@ -146,11 +146,13 @@ core::Result<Layout> read_bag(const std::filesystem::path& path, const TopicName
   layout.format = survey->kind;
   layout.camera = std::move(*camera);
 
-  // The option replaces the camera's delay
+  // Both topics, in the order of stamps
   TopicImages color = images_in(*survey, *topics->color.topic, log);
   TopicImages depth = images_in(*survey, *topics->depth.topic, log);
   const auto color_stamps = stamps_of(color);
   const auto depth_stamps = stamps_of(depth);
+
+  // The option replaces the camera's delay
   const double own_delay_s = layout.camera ? layout.camera->camera.depth_delay_s : 0.0;
   const double delay_s = options.depth_delay_s != 0.0 ? options.depth_delay_s : own_delay_s;
   layout.pairs = pair_by_stamp(color_stamps, depth_stamps, options.max_pair_gap_s, delay_s);

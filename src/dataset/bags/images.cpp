@@ -186,7 +186,7 @@ MessageImage image_of(const ImageMessage& message) {
   if (message.big_endian && image.elemSize1() > 1) swap_bytes(image);
   if (encoding->conversion == kAsItIs) return image;
 
-  // Two pixels share their colour in YUV 4:2:2
+  // YUV 4:2:2 needs an even width
   const bool pairs = encoding->type == CV_8UC2;  // of pixels, which share their colour
   if (pairs && image.cols % 2 != 0)
     return tl::unexpected<std::string>(

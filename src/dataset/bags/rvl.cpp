@@ -28,12 +28,14 @@ class RvlNumbers {
   std::uint32_t next_nibble() {
     constexpr unsigned kNibbles = 8;
 
-    // Words of 32 bits, lowest byte first
+    // A new word after eight nibbles
     if (left_ == 0) {
       if (size_ - at_ < sizeof(word_)) {
         good_ = false;
         return 0;
       }
+
+      // The lowest byte comes first
       word_ = data_[at_] | static_cast<std::uint32_t>(data_[at_ + 1]) << 8 |
               static_cast<std::uint32_t>(data_[at_ + 2]) << 16 |
               static_cast<std::uint32_t>(data_[at_ + 3]) << 24;

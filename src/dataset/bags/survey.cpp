@@ -146,6 +146,8 @@ class Surveyor {
       if (topic.others.size() < kFewMessages || tells_of_body(topic.topic)) topic.others.push_back(place);
     } else if (topic.decoder != nullptr) {
       const auto stamp = topic.decoder->stamp(entry.head, entry.head_size);
+
+      // Images without a stamp cannot be paired
       if (stamp) {
         topic.images.push_back({*stamp, entry.log_ns, place});
       } else {

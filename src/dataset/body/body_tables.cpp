@@ -100,12 +100,16 @@ core::Result<std::vector<std::vector<double>>> read_table(const fs::path& file,
                          : place < static_cast<int>(words.size())
                              ? core::to_number(words[static_cast<std::size_t>(place)])
                              : std::nullopt;
+
+      // Columns may be missing, but not single numbers
       if (!value) {
         return core::input_error(
             fmt::format("{}:{}: column {} is not a number", file.string(), line.number, place + 1));
       }
       row.push_back(*value);
     }
+
+    // The size of a stamp tells its unit
     row[0] *= nanoseconds || row[0] > 1e17 ? 1e-9 : row[0] > 1e14 ? 1e-6 : row[0] > 1e11 ? 1e-3 : 1.0;
     rows.push_back(std::move(row));
   }
@@ -142,6 +146,8 @@ core::Result<std::vector<OdometryReading>> read_odometry_table(const fs::path& f
     const bool full = std::isfinite(r[5] + r[6] + r[7] + r[8]);
     const Eigen::Quaterniond turn = full ? Eigen::Quaterniond(r[8], r[5], r[6], r[7])
                                          : Eigen::Quaterniond(Eigen::AngleAxisd(r[4], Vector3d::UnitZ()));
+
+    // Planar odometry has neither height nor tilt
     OdometryReading reading;
     reading.stamp = r[0];
     reading.odom_from_body = {turn, Vector3d(r[1], r[2], std::isfinite(r[3]) ? r[3] : 0.0)};

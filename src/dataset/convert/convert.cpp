@@ -199,6 +199,8 @@ core::Result<ConvertSummary> copy_frames(const FrameSource& source, CopyTarget& 
       if (first_error.empty()) first_error = problem->message;
       log.warning(fmt::format("frame {} is left out: {}", i, problem->message));
     }
+
+    // Unreadable frames count as progress, too
     if (options.progress) options.progress(i + 1);
   }
 

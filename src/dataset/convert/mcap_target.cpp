@@ -221,7 +221,7 @@ class McapTarget final : public CopyTarget {
 
   /// Millimetres unchanged; other units as metres, which are converted back without loss.
   ImageMessage depth_message(const cv::Mat& stored, const MessageHeader& header) {
-    // ROS knows 16 bits and floats
+    // ROS's depth is 16 bits or 32-bit floats
     cv::Mat depth = stored;
     if (depth.type() == CV_16UC3) cv::extractChannel(depth, depth, 0);
     if (depth.type() == CV_64FC1) depth.convertTo(depth, CV_32F);
@@ -230,6 +230,8 @@ class McapTarget final : public CopyTarget {
     // Units that other programs take for millimetres
     if (depth.type() == CV_16UC1 && (camera_.depth_scale == kFloatDepthScale || others)) {
       cv::Mat metres(depth.size(), CV_32FC1);
+
+      // 65535 marks pixels without measurement
       for (int v = 0; v < depth.rows; ++v) {
         const auto* from = depth.ptr<std::uint16_t>(v);
         auto* to = metres.ptr<float>(v);

@@ -205,7 +205,7 @@ core::Result<sensor::Camera> azure_kinect_camera(const std::string& calibration,
                     mode_names(kColorModes)));
   }
 
-  // Both cameras are calibrated for their modes
+  // The calibration holds both cameras
   const auto parsed = core::parse_json(calibration, "calibration.json");
   if (!parsed) return tl::unexpected(parsed.error());
   const auto depth_camera = camera_in_mode(camera_for(*parsed, "PurposeDepth"), *depth);
@@ -344,6 +344,8 @@ core::Result<Bytes> AzureKinectFile::packet_of(const Track& track, std::int64_t 
   while (demuxer_.next(container_, packet, true)) {
     const bool ours = packet.track == color_.number || packet.track == depth_.number;
     if (!ours) continue;
+
+    // The packet may follow those of the other track
     const bool it = packet.track == track.number && packet.stamp_us == stamp_us;
     const bool past = packet.stamp_us > stamp_us + kBehind_us;
     at_us_ = packet.stamp_us;

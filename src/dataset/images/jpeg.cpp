@@ -58,6 +58,8 @@ std::vector<std::uint8_t> encode_jpeg(const cv::Mat& bgr, int quality) {
   jpeg_set_defaults(&info);
   jpeg_set_quality(&info, quality, TRUE);
   info.optimize_coding = TRUE;
+
+  // Chroma is subsampled only at lower quality
   constexpr int kFine = 90;  // from here on colour is as sharp as brightness
   if (quality >= kFine) info.comp_info[0].h_samp_factor = info.comp_info[0].v_samp_factor = 1;
 

@@ -61,6 +61,8 @@ std::string read_chunks(const Bytes& file, Header& header, Bytes& compressed) {
     // Other chunks do not alter the pixels
     if (std::memcmp(type, "IHDR", 4) == 0 && length == 13) {
       if (big_endian(data) - 1 >= 1U << 24 || big_endian(data + 4) - 1 >= 1U << 24) return "impossible size";
+
+      // Size, bit depth, colour type and interlacing
       header = {static_cast<int>(big_endian(data)), static_cast<int>(big_endian(data + 4)), data[8], data[9],
                 data[12]};
       have_header = true;

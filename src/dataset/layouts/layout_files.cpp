@@ -104,6 +104,8 @@ Layout numbered_layout(const char* format, const NumberedFiles& color, const Num
 std::optional<geometry::Rigid3> read_pose_file(const std::string& file) {
   const auto lines = read_lines(file);
   if (!lines || lines->size() != 4) return std::nullopt;
+
+  // Four rows of four finite numbers
   Eigen::Matrix4d matrix;
   for (std::size_t r = 0; r < 4; ++r) {
     const std::vector<std::string>& words = (*lines)[r].words;

@@ -132,6 +132,8 @@ core::Result<Layout> read_record3d(const fs::path& folder, const LayoutOptions& 
     const json& stamp = element(metadata, "frameTimestamps", number);
     if (stamp.is_number() && std::isfinite(stamp.get<double>()))
       pair.stamp = pair.depth_stamp = stamp.get<double>();
+
+    // Frames without a pose are counted
     if (const auto pose = record3d_pose(element(metadata, "poses", number))) {
       poses.push_back({pair.stamp, *pose});
     } else {
@@ -139,6 +141,7 @@ core::Result<Layout> read_record3d(const fs::path& folder, const LayoutOptions& 
     }
   }
 
+  // Numbers need not be in the order of time
   const auto earlier = [](const auto& a, const auto& b) { return a.stamp < b.stamp; };
   std::stable_sort(layout.pairs.begin(), layout.pairs.end(), earlier);
   std::stable_sort(poses.begin(), poses.end(), earlier);
@@ -150,6 +153,8 @@ core::Result<Layout> read_record3d(const fs::path& folder, const LayoutOptions& 
 
   const fs::path confidence = place / "confidence";
   if (is_folder(confidence)) layout.confidence = confidence.string();
+
+  // The phone's poses are odometry, not ground truth
   if (!poses.empty()) {
     layout.truth = std::move(poses);
     layout.truth_is_odometry = true;

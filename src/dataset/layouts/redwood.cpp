@@ -102,6 +102,8 @@ core::Result<Layout> read_redwood(const fs::path& folder, const LayoutOptions& o
   Layout layout = numbered_layout("redwood", color, depth, options.fps);
   const auto c = by_stamp(color);
   const auto d = by_stamp(depth);
+
+  // Stamps may differ a little, numbers may not
   if (c && d) {
     layout.pairs = pair_by_stamp(*c, *d, options.max_pair_gap_s);
     layout.images = images_of(*c, *d);
@@ -111,6 +113,7 @@ core::Result<Layout> read_redwood(const fs::path& folder, const LayoutOptions& o
     }
   }
 
+  // The numbers of both folders must overlap
   if (layout.pairs.empty()) {
     return core::input_error(
         fmt::format("{}: no number is in both {}/ ({} to {}) and depth/ ({} to {}); colour and depth are "
@@ -119,6 +122,7 @@ core::Result<Layout> read_redwood(const fs::path& folder, const LayoutOptions& o
                     depth.front().first, depth.back().first));
   }
 
+  // Images without a partner are reported
   const std::size_t unmatched = color.size() + depth.size() - 2 * layout.pairs.size();
   if (unmatched > 0) {
     log.warning(fmt::format("{}: {} images have no partner and are skipped", folder.string(), unmatched));

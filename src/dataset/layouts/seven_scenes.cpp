@@ -45,6 +45,8 @@ std::map<int, FrameFiles> list_frames(const fs::path& folder) {
       std::string& color = frames[*number].color;
       if (color.empty() || file < color) color = file;  // the same choice whatever the order of the folder
     }
+
+    // Depth and pose have one file each
     if (rest == ".depth.png") frames[*number].depth = file;
     if (rest == ".pose.txt") frames[*number].pose = file;
   }

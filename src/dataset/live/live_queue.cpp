@@ -71,7 +71,7 @@ SharedBytes LiveQueue::image(ImageId id) const {
   const bool color = id.list == ImageList::kColor;
   if (const SharedBytes& bytes = color ? frame.entry.color : frame.entry.depth) return bytes;
 
-  // Keyframes stay readable after their release
+  // Kept frames stay readable after their release
   auto kept = kept_.get(*frame.kept + (color ? 0 : 1));
   return kept ? std::make_shared<const core::Bytes>(std::move(*kept)) : nullptr;
 }

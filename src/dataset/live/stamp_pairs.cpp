@@ -54,6 +54,8 @@ std::optional<StampPairs::Pair> StampPairs::next(bool final) {
     const auto depth = nearest_depth(0);
     const bool same_moment = depth && gap(color_.front(), depth_[*depth]) == 0;
     const bool depth_certain = final || same_moment || (!depth_.empty() && depth_.back().stamp_ns >= when);
+
+    // Nearer depth may still arrive
     if (!depth_certain) return std::nullopt;
     if (!depth) {
       // Nothing near it has come, and nothing can.

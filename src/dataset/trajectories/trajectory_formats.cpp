@@ -257,6 +257,8 @@ core::Result<void> pair_by_number(TrajectoryReading& estimate, TrajectoryReading
       pose.stamp =
           other.stamped ? other.rows[static_cast<std::size_t>(pose.stamp)] : kittis_step_s * pose.stamp;
     }
+
+    // Rows without a finite stamp are left out
     auto& poses = reading.poses;
     const auto lost = [](const geometry::StampedPose& pose) { return !std::isfinite(pose.stamp); };
     poses.erase(std::remove_if(poses.begin(), poses.end(), lost), poses.end());
