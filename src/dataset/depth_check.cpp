@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kDepthSamples = 5;
 // Structured light and time of flight measure hardly anything beyond. If millimetres are read in TUM's unit
-// the median of a desk is still that of a room (1.3 m for 6.3 m), but its background lies far outside.
+// the median of a desk is still that of a room (1.3 m for 6.3 m), but its background is far outside.
 constexpr double kSensorReach_m = 10.0;
 constexpr double kMaxShareBeyondReach = 0.1;
 constexpr double kMaxShareTooNear = 0.05;

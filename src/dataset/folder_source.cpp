@@ -139,7 +139,7 @@ class FolderSource final : public FrameSource, public BodySource {
     return !problem && !inside(real, std::filesystem::canonical(layout_.folder, problem)) && !problem;
   }
 
-  /// Depth without what the recorder's masks say is none.
+  /// Depth without the pixels that the recorder's masks exclude.
   [[nodiscard]] core::Result<cv::Mat> measured_depth(const PairInfo& pair) const {
     auto depth = read_depth(layout_, pair.depth, depth_camera(), camera_.depth_scale);
     if (!depth || layout_.confidence.empty()) return depth;

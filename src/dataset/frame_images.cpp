@@ -44,7 +44,7 @@ bool channels_are_equal(const cv::Mat& image) {
   return true;
 }
 
-/// The first readable image of the pairs and where it is; empty if none is readable.
+/// The first readable image of the pairs and its place; empty if none is readable.
 std::pair<ImageId, cv::Mat> first_image(const Layout& layout, ImageId PairInfo::*image) {
   for (const PairInfo& pair : layout.pairs) {
     if (auto read = layout.images->read(pair.*image)) return {pair.*image, std::move(*read)};

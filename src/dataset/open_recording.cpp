@@ -109,7 +109,7 @@ void drop_same_stamps(const std::string& folder, Layout& layout, core::Log& log)
   pairs.erase(end, pairs.end());
 }
 
-/// The frames that a recording names, with those that are there.
+/// The frames that a recording names, with those that exist.
 struct ListedFrames {
   std::vector<double> stamps;
   std::vector<std::optional<std::size_t>> places;  ///< among the layout's pairs; none: a file is missing

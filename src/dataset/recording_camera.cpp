@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 constexpr std::uintmax_t kMaxScannedBytes = 65536;  // of files that may be camera files by their content
 
-/// Names that camera files have beside recordings, in the order in which they are tried.
+/// Names of camera files in recordings' folders, in the order in which they are tried.
 constexpr std::array<const char*, 16> kCameraFiles = {"camera.yaml",
                                                       "camera_intrinsic.json",
                                                       "intrinsic.json",
@@ -93,7 +93,7 @@ geometry::Rigid3 scannet_extrinsic(const fs::path& file) {
   return is_file(file) ? read_pose_file(file.string()).value_or(geometry::Rigid3()) : geometry::Rigid3();
 }
 
-/// ScanNet has a calibration of depth beside that of colour; its size comes from the images.
+/// ScanNet has a separate calibration of depth; its size comes from the images.
 core::Result<void> add_depth_camera(const fs::path& folder, sensor::Camera& camera) {
   const fs::path file = folder / "intrinsic_depth.txt";
   if (!is_file(file)) return {};
@@ -215,7 +215,7 @@ core::Result<cv::Size> size_in(const Layout& layout, ImageId PairInfo::*image) {
                                        first.list == ImageList::kDepth ? "depth" : "colour"));
 }
 
-/// Sizes that the camera file does not say, from the images.
+/// Sizes that the camera file lacks, from the images.
 core::Result<void> add_sizes(const ChosenCamera& chosen, const Layout& layout, sensor::Camera& camera) {
   if (!chosen.reading.has_size) {
     const auto size = size_in(layout, &PairInfo::color);

@@ -191,7 +191,7 @@ Database open_database(const std::filesystem::path& file, const char* mode) {
 }  // namespace
 
 OpenedBag open_db3(const std::filesystem::path& file, const std::string& shown) {
-  // A journal beside the file can only be read if files may be made beside it; otherwise it is ignored.
+  // A journal can only be read if files may be made in its folder; otherwise it is ignored.
   core::Error first;
   std::error_code ignored;
   const bool journal = std::filesystem::exists(file.string() + "-wal", ignored);

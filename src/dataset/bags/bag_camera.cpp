@@ -58,14 +58,14 @@ tl::expected<sensor::Lens, std::string> lens_of(const CameraInfoMessage& info) {
   return lens;
 }
 
-/// The camera of a message: of the full picture, and of the images that it accompanies.
+/// The camera of a message: of the full image, and of the images that it accompanies.
 struct InfoPinholes {
   sensor::Pinhole full;
   sensor::Pinhole image;
   [[nodiscard]] bool differ() const { return full.width != image.width || full.height != image.height; }
 };
 
-/// Size and offset along one axis of the image that is made of the full picture.
+/// Size and offset along one axis of the image that is made of the full one.
 struct InfoAxis {
   std::uint32_t full = 0;
   std::uint32_t offset = 0;
@@ -73,7 +73,7 @@ struct InfoAxis {
   std::uint32_t binning = 1;  ///< 0 means 1
 };
 
-/// The axis with both zeros replaced by what they mean; none if the region does not fit in the full picture.
+/// The axis with its defaults (0) filled in; none if the region does not fit into the full image.
 std::optional<InfoAxis> complete_axis(InfoAxis axis) {
   if (axis.offset >= axis.full) return std::nullopt;
   if (axis.region == 0) axis.region = axis.full - axis.offset;
@@ -82,7 +82,7 @@ std::optional<InfoAxis> complete_axis(InfoAxis axis) {
   return axis;
 }
 
-/// REP 104: the region of interest is cut out of the full picture, and its pixels are binned. A pixel's
+/// REP 104: the region of interest is cut out of the full image, and its pixels are binned. A pixel's
 /// middle is at whole numbers here, so that binned pixel 0 of two has its middle at 0.5 of the unbinned ones.
 tl::expected<InfoPinholes, std::string> pinholes_of(const CameraInfoMessage& info, bool by_p) {
   const auto size_ok = [](std::uint32_t size) { return size > 0 && size <= 32768; };
@@ -178,7 +178,7 @@ core::Result<std::optional<InfoCamera>> read_info(const BagSurvey& survey, const
   return camera;
 }
 
-/// Frames and how they sit in their parents.
+/// Frames with their poses in the parent frames.
 class Transforms {
  public:
   void add(const std::vector<TransformMessage>& transforms) {
@@ -229,7 +229,7 @@ Transforms read_all_transforms(const BagSurvey& survey) {
   return transforms;
 }
 
-/// Base name of the topics that RealSense's recorder writes beside an image topic:
+/// Base name of the topics that RealSense's recorder writes for an image topic:
 /// "/device_0/sensor_0/Depth_0" for ".../image/data".
 std::string realsense_stream(const std::string& image) {
   const std::size_t at = image.find(kRealSenseImage);
@@ -254,7 +254,7 @@ double realsense_depth_scale(const BagSurvey& survey, const std::string& stream)
     if (!units || topic.others.empty()) continue;
     const auto metres = survey.first(topic, &MessageDecoder::number);
     if (!metres || !(*metres > 1e-7F && *metres < 1.0F)) continue;
-    // Written as a float: 0.001 is meant by the float next to it.
+    // Rounded, because 0.001 as a float is not exactly 1 / 1000
     return std::round(100.0 / static_cast<double>(*metres)) / 100.0;
   }
   return kMillimetres;

@@ -91,7 +91,7 @@ void BodyMessages::join_accelerations() {
 
 std::shared_ptr<const BodyReadings> read_bag_body(const BagSurvey& survey, const ChosenTopics& topics,
                                                   core::Log& log) {
-  // The liveliest topic first.
+  // The topic with the most messages comes first
   std::vector<const SurveyedTopic*> told;
   for (const SurveyedTopic& topic : survey.topics) {
     if (tells_of_body(topic.topic) && topic.decoder != nullptr) told.push_back(&topic);

@@ -182,7 +182,7 @@ core::Result<ChosenTopic> choose_color(const BagSurvey& survey, const std::vecto
   if (colors.size() == 1)
     return ChosenTopic{colors.front().topic, "the only colour image", colors.front().encoding};
 
-  // Colours before grey, the camera that depth is of before others, without distortion before with it.
+  // Colour before grey, depth's own camera before others, undistorted before distorted images
   const auto rank = [&depth](const Candidate& c) {
     const std::string& name = c.topic->topic.name;
     const bool colored = !contains(c.encoding, "mono") && c.encoding != "8UC1";

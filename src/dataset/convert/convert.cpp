@@ -51,7 +51,7 @@ bool is_unfinished_list(const fs::path& file) {
   return file.filename().string().rfind(".associations.txt.", 0) == 0;
 }
 
-/// True for "1305031102.175304000.png", and for what is first written for it.
+/// True for "1305031102.175304000.png" and for its temporary file.
 bool is_image_of_a_copy(const std::string& name) {
   constexpr std::size_t kDecimals = 9;
   const std::size_t begin = name.find_first_not_of(".-");
@@ -71,7 +71,7 @@ bool only_parts_of_a_copy(const fs::path& folder) {
          });
 }
 
-/// True if convert_recording() wrote what is there: no other recording may be replaced.
+/// True if convert_recording() wrote the existing copy: no other recording may be replaced.
 bool is_copy(const fs::path& there, bool file) {
   std::error_code ec;
   if (file) {
@@ -133,8 +133,8 @@ core::Result<void> check_place(const fs::path& out, const fs::path& partial, boo
   return file ? core::check_writable(out) : clear_leftover(partial, replace);
 }
 
-/// Asks again whether `out` may be written: it may have come while the copy was made. `written`: where the
-/// copy is, "" if it is not written yet.
+/// Checks again that `out` may be written: it may have appeared while the copy was made. `written`: the place
+/// of the copy, "" if it is not written yet.
 core::Result<void> make_room_again(const fs::path& out, bool file, bool replace, const fs::path& written) {
   const auto room = make_room(out, file, replace);
   if (room) return {};
@@ -143,7 +143,7 @@ core::Result<void> make_room_again(const fs::path& out, bool file, bool replace,
   return core::output_error(fmt::format("{}; {}", room.error().message, where));
 }
 
-/// Moves a folder, which was written beside its destination, to it.
+/// Moves a folder, which was written next to its destination, there.
 core::Result<void> put_in_place(const fs::path& written, const fs::path& out, bool replace) {
   if (auto room = make_room_again(out, false, replace, written); !room) return room;
   std::error_code problem;
@@ -157,7 +157,7 @@ core::Result<void> put_in_place(const fs::path& written, const fs::path& out, bo
                                         out.string(), problem.message(), written.string()));
 }
 
-/// Refuses images that a link brings into the recording's folder: what lies elsewhere is not the recording's.
+/// Refuses images that a link brings into the recording's folder: others are not the recording's.
 core::Result<void> check_links(const StoredPair& pair) {
   for (const StoredImage* image : {&pair.color, &pair.depth}) {
     if (!image->linked_out) continue;

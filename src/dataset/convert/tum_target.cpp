@@ -51,7 +51,7 @@ class TumTarget final : public CopyTarget {
   }
 
  private:
-  /// Into a file of `part`; its name.
+  /// Writes a file into the folder `part`; returns its name.
   core::Result<std::string> write(const std::string& part, const std::string& name,
                                   const StoredImage& image) {
     StoredImage file = image;

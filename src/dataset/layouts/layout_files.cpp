@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Helpers for the readers of several layouts: numbered images, poses in files of their own.
+// Helpers for the readers of several layouts: numbered images, poses in separate files.
 #include <algorithm>
 #include <cmath>
 #include <map>

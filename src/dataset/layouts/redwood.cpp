@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Redwood and Open3D layout: color/, image/ or rgb/ beside depth/, files matched by their number;
+// Redwood and Open3D layout: color/, image/ or rgb/, and depth/, files matched by their number;
 // trajectory.log (Choi, Zhou, Koltun: Robust Reconstruction of Indoor Scenes, CVPR 2015) as truth.
 #include <fmt/format.h>
 

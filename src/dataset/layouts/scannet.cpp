@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // ScanNet's exported frames: color/0.jpg, depth/0.png, pose/0.txt, intrinsic/intrinsic_color.txt and
-// intrinsic_depth.txt. Colour and depth have sizes and calibrations of their own; numbers have no zeros in
+// intrinsic_depth.txt. Colour and depth differ in size and calibration; numbers have no zeros in
 // front.
 #include <fmt/format.h>
 

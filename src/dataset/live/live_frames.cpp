@@ -124,7 +124,7 @@ core::Result<void> LiveFrames::push(const LiveFrame& frame) {
     return core::input_error(
         fmt::format("stamps are finite seconds, not {} and {}", frame.stamp, depth_stamp));
 
-  // A place in the queue, or a reason to have none.
+  // The frame gets a place in the queue, or is refused for a reason
   switch (live_->queue->push({frame.stamp, depth_stamp, *color, *depth, frame.odometry})) {
     case LiveQueue::Answer::kTaken:
       return {};

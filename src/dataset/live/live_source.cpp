@@ -28,7 +28,7 @@ class LiveSource final : public LiveFrameSource, public BodySource {
 
   [[nodiscard]] PairInfo info(std::size_t index) const override {
     PairInfo pair = queue_.info(index);
-    // One after another, as a recording's are: to the last digit.
+    // One by one as for recordings: the sum is the same to the last digit
     for (const double delay : delays_) pair.depth_stamp += delay;
     return pair;
   }

@@ -69,7 +69,7 @@ void LiveStream::leave_out(std::size_t LiveReport::*count, const std::string& wh
 }
 
 void LiveStream::number(const StampPairs::Pair& pair) {
-  // A number in the queue, or a reason to have none.
+  // The frame gets a number in the queue, or is left out for a reason
   const double stamp = seconds_of(pair.color.stamp_ns);
   switch (queue_->push({stamp, seconds_of(pair.depth.stamp_ns), pair.color.bytes, pair.depth.bytes})) {
     case LiveQueue::Answer::kTaken:

@@ -80,8 +80,7 @@ class StreamSurveyor {
     found_.images.push_back(std::move(kept));
   }
 
-  /// Colour and depth are chosen for certain, and what there is of their calibration has come. Looked at
-  /// from time to time.
+  /// True if colour and depth are certain and their calibration has arrived; tested from time to time.
   bool complete() {
     const auto now = Clock::now();
     if (found_.images.empty() || now - first_image_ < kOthersMayCome || now - judged_ < kLookEvery)
@@ -101,7 +100,7 @@ class StreamSurveyor {
     sort_topics();
     return std::move(found_);
   }
-  /// Keeps messages of these topics only, and of those that tell of the body, which it returns.
+  /// Keeps messages of these topics only, and of those about the body, which it returns.
   std::vector<BagTopic> keep_only(const std::set<std::string>& topics, bool with_body) {
     std::vector<BagTopic> body;
     for (const auto& [topic, type] : types_) {
@@ -221,7 +220,7 @@ core::Result<LiveSurvey> survey_stream(const std::string& address, MessageStream
   const auto& readers = core::part<BagReaders>();
   if (!readers) return tl::unexpected(readers.error());
 
-  // Until it is certain which topics are the camera's.
+  // Messages until the camera's topics are certain
   StreamSurveyor surveyor(address, stream, named, **readers);
   const auto until = Clock::now() + patience;
   while (Clock::now() < until && !surveyor.complete()) {

@@ -63,7 +63,7 @@ core::Result<void> fits_live(const std::string& address, const OpenOptions& opti
       fmt::format("{}: is live; {} is about recordings (--for S ends the run)", address, wrong));
 }
 
-/// The messages that say what the cameras are.
+/// The messages with the calibrations of both cameras.
 LiveRecord::Infos infos_of(const BagSurvey& survey, const ChosenTopics& topics) {
   LiveRecord::Infos infos;
   const auto first = [&](const ChosenTopic& chosen) -> std::optional<CameraInfoMessage> {
@@ -192,7 +192,7 @@ core::Result<std::unique_ptr<LiveFrameSource>> open_live(const std::string& addr
   if (auto begun = begin(address, *found, *topics, options, *live); !begun)
     return tl::unexpected(begun.error());
 
-  // The first frames say the rest, as those of a recording do.
+  // The first frames complete and check the camera, as for recordings
   const auto camera = complete_live_camera(address, options, *chosen, *found, *topics, live->layout, log);
   if (!camera) return tl::unexpected(camera.error());
   if (auto likely = check_focal_lengths(*camera, address); !likely) return tl::unexpected(likely.error());

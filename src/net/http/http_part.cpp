@@ -180,7 +180,7 @@ struct Running {
   std::thread thread;
 };
 
-/// Compares in a time that does not depend on how much is right.
+/// Compares in a time that does not depend on the number of equal characters.
 bool same_secret(const std::string& given, const std::string& right) {
   unsigned char differs = given.size() == right.size() ? 0 : 1;
   for (std::size_t i = 0; i < right.size(); ++i)
@@ -203,7 +203,7 @@ bool own_name(const Running& running, const std::string& host) {
          ::inet_pton(AF_INET6, address.c_str(), &number) == 1;
 }
 
-/// Status of a request that is refused; 0: it is not.
+/// Status of a request that is refused; 0 if it is allowed.
 int refused(const Running& running, const httplib::Request& request) {
   const std::string scheme = "http://";
   if (request.get_header_value_count("Host") > 1) return 400;

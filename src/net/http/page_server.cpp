@@ -24,7 +24,7 @@ bool all_digits(const std::string& text) {
          std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
 }
 
-/// 0, or why the system does not let a server have the address.
+/// The error with which the system refuses the address to a server; 0: none.
 int bind_problem(const addrinfo& address) {
   const int descriptor = ::socket(address.ai_family, address.ai_socktype | SOCK_CLOEXEC, address.ai_protocol);
   if (descriptor < 0) return errno;

@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kBearings = 720;    // of a turn
 constexpr int kBlock = 64;        // the grid grows by blocks of cells
-constexpr double kFloor_m = 0.1;  // how far measured floor lies from z = 0
+constexpr double kFloor_m = 0.1;  // greatest distance of measured floor from z = 0
 constexpr int kFewestPoints = 2;  // of an obstacle in one cell of a beam
 constexpr double kBody_m = 0.2;   // whoever carries the camera stands on free ground
 constexpr double kPi = 3.14159265358979323846;
@@ -65,7 +65,7 @@ std::optional<LiveGrid::Change> LiveGrid::take() {
   std::vector<std::uint8_t> now(cells_.size());
   for (std::size_t i = 0; i < now.size(); ++i) now[i] = value(i);
 
-  // All cells that were sent since the last whole grid: who has that and the latest part has everything
+  // All cells sent since the last whole grid: that and the latest part are complete
   const bool resized = sent_.size() != now.size();
   bool changed = resized;
   for (std::size_t i = 0; !resized && i < now.size(); ++i) {
@@ -224,7 +224,7 @@ void LiveGrid::make_room(const Scan& scan) {
   size_ = size;
 }
 
-/// Something that was there and is not any more is free once three times as many scans saw through it.
+/// A removed obstacle is free once three times as many scans saw through it.
 std::uint8_t LiveGrid::value(std::size_t cell) const {
   constexpr std::uint8_t kFree = 0;
   constexpr std::uint8_t kOccupied = 100;

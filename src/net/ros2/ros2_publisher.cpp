@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A run on ROS 2's network: where the camera is, its path, and points.
+// Publishes a run on ROS 2's network: pose of the camera, its path, and points.
 #include <fmt/format.h>
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
@@ -31,7 +31,7 @@ constexpr const char* kGrid = "nav_msgs/OccupancyGrid";
 constexpr const char* kGridUpdate = "map_msgs/OccupancyGridUpdate";
 constexpr const char* kPose = "geometry_msgs/PoseWithCovarianceStamped";
 
-/// A camera looks along z and has x to its right; ROS' bodies look along x and have z above them.
+/// A camera's z points forward and its x to the right; of ROS's bodies x points forward and z up.
 Rigid3 body_from_optical() {
   Eigen::Matrix3d rotation;
   rotation << 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0;
@@ -137,7 +137,7 @@ class Ros2Publisher final : public pipeline::RunObserver {
     note_correction(robot, map_from_odometry);
   }
 
-  /// A frame without a pose: the correction stays as it was. One that was located tells how well.
+  /// A frame without a pose repeats the last correction; a located frame is sent with its accuracy.
   void processed(const pipeline::LivePose& pose) override {
     if (robots_.size() != 1) return;
     if (pose.world_from_camera) {
@@ -163,12 +163,12 @@ class Ros2Publisher final : public pipeline::RunObserver {
 
   void added(std::int32_t robot, double stamp, const Rigid3& map_from_cloud,
              const cloud::Cloud& cloud) override {
-    // The cloud goes on to others: what is sent is made of it now.
+    // Packed at once, because the cloud is only borrowed
     post_points(topic(robot, "points"), frame(robot, frames_.map), stamp,
                 packed(cloud, published_from_map_ * map_from_cloud), false);
     if (frames_.base.empty()) return;
 
-    // Without a base nobody knows where the floor is.
+    // The base tells the height of the floor
     const Rigid3 published_from_cloud = published_from_map_ * map_from_cloud;
     const std::vector<Eigen::Vector3f> points = thinned(cloud, published_from_cloud);
     const std::lock_guard lock(mutex_);
@@ -209,10 +209,10 @@ class Ros2Publisher final : public pipeline::RunObserver {
     if (!frames_.base.empty()) return frames_.base;
     return frames_.camera.empty() ? "camera" : frames_.camera;
   }
-  /// Without a base, the lowest frame is the camera's, whose axes are its own.
+  /// Without a base, the lowest frame is the camera itself.
   [[nodiscard]] Rigid3 body_of_camera() const { return frames_.base.empty() ? Rigid3() : body_; }
 
-  /// True if the pose of the base comes from somebody else; says so when that begins.
+  /// True if another program publishes the pose of the base; logged when that begins.
   [[nodiscard]] bool another_publishes() {
     if (others_ == nullptr || frames_.odom_tf == OdomTf::kOwn) return false;
     const std::string parent = others_->other_parent();
@@ -238,7 +238,7 @@ class Ros2Publisher final : public pipeline::RunObserver {
     return !several(robots_.size()) ? frame(0, frames_.map) : "map";
   }
 
-  /// Keeps a robot's correction, and tells of a jump.
+  /// Keeps a robot's correction, and reports a jump.
   void note_correction(std::int32_t robot, const Rigid3& map_from_odometry) {
     constexpr double kJump_m = 0.05;
     constexpr double kJump_rad = 0.035;
@@ -267,7 +267,7 @@ class Ros2Publisher final : public pipeline::RunObserver {
     return grids_.try_emplace(robot, options).first->second;
   }
 
-  /// A whole grid, then parts that differ from it, so that who subscribes late gets both.
+  /// A whole grid, then parts that differ from it, so that late subscribers get both.
   void post_grid(std::int32_t robot, double stamp, LiveGrid& grid) {
     auto change = grid.take();
     if (!change) return;
@@ -329,7 +329,7 @@ class Ros2Publisher final : public pipeline::RunObserver {
   Outgoing outgoing_;
 };
 
-/// base_from_camera by /tf_static, and somebody else's pose of the base if it is waited for.
+/// base_from_camera by /tf_static; waits a moment for another program's pose of the base, too.
 core::Result<Rigid3> mounted(const PublishedFrames& frames, const TransformListener& others, core::Log& log) {
   constexpr std::chrono::seconds kStatic(5), kOthers(2);
   const auto begin = std::chrono::steady_clock::now();

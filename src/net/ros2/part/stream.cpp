@@ -127,8 +127,7 @@ class Ros2Stream final : public dataset::MessageStream {
     return dds_get_sample_lost_status(reader.handle, &status) == DDS_RETCODE_OK ? status.total_count : 0;
   }
 
-  /// Publications that were found since the last look. Of several of one topic the least that is offered
-  /// counts.
+  /// Adds the publications that were found since the last call.
   void look_around() {
     void* sample = nullptr;
     dds_sample_info_t info;
