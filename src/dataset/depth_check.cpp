@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kDepthSamples = 5;
 // Structured light and time of flight measure hardly anything beyond. If millimetres are read in TUM's unit
-// the median of a desk is still that of a room (1.3 m for 6.3 m), but its background lies far outside.
+// the median of a desk is still that of a room (1.3 m for 6.3 m), but its background is far outside.
 constexpr double kSensorReach_m = 10.0;
 constexpr double kMaxShareBeyondReach = 0.1;
 constexpr double kMaxShareTooNear = 0.05;
@@ -45,9 +45,12 @@ core::Result<DepthStatistics> sample_depth(const FrameSource& source, const std:
     }
   };
 
+  // All frames only if the samples have no depth
   for (const std::size_t i : spread(source.size(), kDepthSamples)) add(i);
   for (std::size_t i = 0; i < source.size() && !statistics.median(); ++i) add(i);
   if (statistics.median()) return statistics;
+
+  // Unreadable and empty images have different remedies
   if (!readable) {
     return core::input_error(fmt::format("{}: none of the {} pairs can be read; the first: {}", folder,
                                          source.size(), first_error));
@@ -79,12 +82,16 @@ core::Result<ScaleCheck> check_depth_scale(const FrameSource& source, const std:
   const std::string what =
       fmt::format("{}: with depth_scale {} the median depth is {:.4g} m", folder, scale, median);
 
+  // A scale that fits is the likely remedy
   const std::string remedy =
       fit == scale ? std::string("; correct the camera file")
                    : fmt::format("; depth_scale {} would fit (median {:.2g} m); correct the camera file", fit,
                                  median * scale / fit);
+
+  // No camera measures such a median
   if (median < kLeastMedian_m || median > kMostMedian_m) return core::input_error(what + remedy);
 
+  // One sign may be due to the scene
   std::string signs;
   int count = 0;
   const auto add = [&](const std::string& sign) { signs += (count++ > 0 ? ", " : "") + sign; };
@@ -95,6 +102,8 @@ core::Result<ScaleCheck> check_depth_scale(const FrameSource& source, const std:
   const double nearest = nearest_of(source.camera());
   if (const double nearer = 1.0 - depth->share_beyond(nearest); nearer > kMaxShareTooNear)
     add(fmt::format("{:.0f} % is nearer than the {} m that they need", 100.0 * nearer, nearest));
+
+  // Steps of disparity grow with the square of depth
   if (const auto step = depth->disparity_step(scale); step && (*step < kFinestStep || *step > kCoarsestStep))
     add(fmt::format("its steps ({:.2g} z^2) are those of no camera's disparity", *step));
 
@@ -110,6 +119,7 @@ core::Result<void> check_focal_lengths(const sensor::Camera& camera, const std::
     return core::input_error(lengths + ", but pixels are nearly square; correct the camera file");
   }
 
+  // The field of view must be plausible
   const double angle_deg = 2.0 * std::atan(0.5 * std::max(c.width / c.fx, c.height / c.fy)) * 180.0 / M_PI;
   if (angle_deg >= kLeastView_deg && angle_deg <= kMostView_deg) return {};
   return core::input_error(

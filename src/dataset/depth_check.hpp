@@ -17,7 +17,7 @@ struct ScaleCheck {
 /// Looks at the depth of a few frames for signs of a wrong unit: more than a tenth of it beyond the reach of
 /// depth cameras, more than a twentieth nearer than the camera can measure, steps of no camera's disparity. A
 /// median alone is none: scenes are near or far. Error (kInput): it cannot be metres, or no frame can be
-/// read. `folder`: what messages call the source.
+/// read. `folder`: name of the source in messages.
 core::Result<ScaleCheck> check_depth_scale(const FrameSource& source, const std::string& folder);
 
 /// Error (kInput): no RGB-D camera has such focal lengths; a digit or a point of its file is wrong.

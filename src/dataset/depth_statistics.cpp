@@ -87,6 +87,8 @@ double fitting_depth_scale(double median_raw) {
     return *std::min_element(scales.begin(), scales.end(),
                              [&](double a, double b) { return distance(a) < distance(b); });
   };
+
+  // Common scales come first, because rare ones fit, too
   const double common = nearest({5000.0, 1000.0});
   const double median = median_raw / common;
   if (median >= kUsualMin && median <= kUsualMax) return common;

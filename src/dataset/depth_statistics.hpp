@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Depth of a few sample frames, and whether it looks like metres.
+// Depth of a few sample frames, and signs that its unit is wrong.
 #include <cstddef>
 #include <opencv2/core/mat.hpp>
 #include <optional>

@@ -32,6 +32,8 @@ class FolderSource final : public FrameSource, public BodySource {
     if (layout_.body == nullptr) return {};
     BodyReadings readings =
         readings_between(layout_.body->imu, layout_.body->odometry, imu_after, odometry_after, until);
+
+    // The mount is fixed
     readings.body_from_camera = layout_.body->body_from_camera;
     return readings;
   }
@@ -40,6 +42,8 @@ class FolderSource final : public FrameSource, public BodySource {
   [[nodiscard]] std::unique_ptr<FrameSource> taken_by(const sensor::Camera& better) const override {
     Layout layout = layout_;
     if (auto again = layout_.images->opened_again()) layout.images = std::move(again);
+
+    // The other camera may have another delay
     for (PairInfo& pair : layout.pairs) pair.depth_stamp += better.depth_delay_s - camera_.depth_delay_s;
     auto source = std::make_unique<FolderSource>(name_, std::move(layout), better, rectified_);
     source->set_doubt(doubt_);
@@ -54,10 +58,13 @@ class FolderSource final : public FrameSource, public BodySource {
     auto depth = measured_depth(pair);
     if (!depth) return tl::unexpected(depth.error());
 
+    // Each image may have its own camera
     std::optional<sensor::Rectifier> own;
     if (pair.camera >= 0) own.emplace(camera_of(pair), rectified_);
     const sensor::Rectifier& rectifier = own ? *own : rectifier_;
     sensor::RgbdFrame frame = rectified_frame(index, pair, *color, *depth, rectifier);
+
+    // The recorder's odometry at the time of the frame
     if (layout_.gives_odometry && layout_.truth)
       frame.odometry = geometry::pose_at(*layout_.truth, pair.stamp, kNearestPose_s);
     return frame;
@@ -70,11 +77,13 @@ class FolderSource final : public FrameSource, public BodySource {
           name_ + ": each image has its own camera, which a copy cannot describe; map the original");
     }
 
+    // Colour of the camera's size
     auto color = stored_image(pair.color);
     if (!color) return tl::unexpected(color.error());
     std::string problem = color_problem(color->pixels, camera_.color, layout_.color_reduction);
     if (!problem.empty()) return core::input_error(color->name + ": " + problem);
 
+    // Uncertain depth is not copied
     auto depth = layout_.confidence.empty() ? stored_image(pair.depth) : masked_depth(pair);
     if (!depth) return tl::unexpected(depth.error());
     problem = depth_problem(depth->pixels, depth_camera());
@@ -130,7 +139,7 @@ class FolderSource final : public FrameSource, public BodySource {
     return !problem && !inside(real, std::filesystem::canonical(layout_.folder, problem)) && !problem;
   }
 
-  /// Depth without what the recorder's masks say is none.
+  /// Depth without the pixels that the recorder's masks exclude.
   [[nodiscard]] core::Result<cv::Mat> measured_depth(const PairInfo& pair) const {
     auto depth = read_depth(layout_, pair.depth, depth_camera(), camera_.depth_scale);
     if (!depth || layout_.confidence.empty()) return depth;
@@ -159,6 +168,7 @@ class FolderSource final : public FrameSource, public BodySource {
 
 std::unique_ptr<FrameSource> make_folder_source(std::string name, Layout layout, sensor::Camera camera,
                                                 std::string doubt) {
+  // Rectified images keep the camera's pinhole
   const sensor::Pinhole rectified = camera.color;
   auto source =
       std::make_unique<FolderSource>(std::move(name), std::move(layout), std::move(camera), rectified);

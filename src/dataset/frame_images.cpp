@@ -33,6 +33,7 @@ std::string size_problem(const cv::Mat& image, int width, int height, const char
       image.cols, image.rows, width, height);
 }
 
+/// True for grey images stored as three channels.
 bool channels_are_equal(const cv::Mat& image) {
   for (int v = 0; v < image.rows; ++v) {
     const auto* pixel = image.ptr<cv::Vec3w>(v);
@@ -43,7 +44,7 @@ bool channels_are_equal(const cv::Mat& image) {
   return true;
 }
 
-/// The first readable image of the pairs and where it is; empty if none is readable.
+/// The first readable image of the pairs and its place; empty if none is readable.
 std::pair<ImageId, cv::Mat> first_image(const Layout& layout, ImageId PairInfo::*image) {
   for (const PairInfo& pair : layout.pairs) {
     if (auto read = layout.images->read(pair.*image)) return {pair.*image, std::move(*read)};
@@ -51,6 +52,7 @@ std::pair<ImageId, cv::Mat> first_image(const Layout& layout, ImageId PairInfo::
   return {};
 }
 
+/// The median of measured pixels; none if nothing was measured.
 std::optional<double> median_of(const cv::Mat& metres) {
   std::vector<float> measured;
   for (int v = 0; v < metres.rows; ++v) {
@@ -65,6 +67,7 @@ std::optional<double> median_of(const cv::Mat& metres) {
 
 }  // namespace
 
+/// Values outside 1 to 65534 units become 0: no measurement.
 cv::Mat depth_units(const cv::Mat& metres, double depth_scale) {
   constexpr double kMostUnits = 65534.0;  // 65535 means no measurement
   cv::Mat units(metres.size(), CV_16UC1);
@@ -85,6 +88,8 @@ core::Result<void> mask_depth(const std::string& mask_file, cv::Mat& depth) {
   if (mask->type() != CV_8UC1)
     return core::input_error(
         fmt::format("{}: the mask has {}; one channel of 8 bits is needed", mask_file, type_name(*mask)));
+
+  // Nearest pixels keep the mask's classes
   if (mask->size() != depth.size()) cv::resize(*mask, *mask, depth.size(), 0.0, 0.0, cv::INTER_NEAREST);
   depth.setTo(0, *mask == 0);
   return {};
@@ -100,6 +105,8 @@ std::string color_problem(const cv::Mat& image, const sensor::Pinhole& camera, i
 
 std::string depth_problem(const cv::Mat& image, const sensor::Pinhole& camera) {
   const bool one = image.type() == CV_16UC1 || image.type() == CV_32FC1 || image.type() == CV_64FC1;
+
+  // Three equal channels count as one
   if (!one && !(image.type() == CV_16UC3 && channels_are_equal(image))) {
     return fmt::format(
         "the depth image has {}; a 16-bit PNG or PGM with one channel is needed, or floats "
@@ -131,6 +138,7 @@ core::Result<cv::Mat> read_color(const Layout& layout, ImageId id, const sensor:
   return color_pixels(std::move(*image), camera, layout.color_reduction);
 }
 
+/// Depth of the camera's size, as 16 bits in its units.
 core::Result<cv::Mat> read_depth(const Layout& layout, ImageId id, const sensor::Pinhole& camera,
                                  double depth_scale) {
   auto image = layout.images->read(id);
@@ -146,6 +154,8 @@ sensor::RgbdFrame rectified_frame(std::size_t index, const PairInfo& pair, const
   frame.index = static_cast<std::int64_t>(index);
   frame.stamp = pair.stamp;
   frame.depth_stamp = pair.depth_stamp;
+
+  // Both images in the rectified camera
   frame.color = rectifier.color(color);
   cv::cvtColor(frame.color, frame.gray, cv::COLOR_BGR2GRAY);
   frame.depth = rectifier.depth(depth);
@@ -157,14 +167,15 @@ core::Result<void> check_image_kinds(const Layout& layout, sensor::Camera& camer
   if (!color.empty() && color.depth() == CV_16U && color.channels() >= 3)
     log.info("the colour images have 16 bits a channel; the upper 8 are used");
 
+  // Some programs store depth as three channels
   const auto [id, depth] = first_image(layout, &PairInfo::depth);
   if (depth.type() == CV_16UC3 && channels_are_equal(depth))
     log.info("the depth images have three equal channels; the first is used");
   if (depth.type() != CV_32FC1 && depth.type() != CV_64FC1) return {};
 
+  // Millimetres as floats are a common mistake
   cv::Mat metres;
   depth.convertTo(metres, CV_32F);
-
   const auto median = median_of(metres);
   if (median && *median > kFarthestMedian_m) {
     return core::input_error(
@@ -173,6 +184,7 @@ core::Result<void> check_image_kinds(const Layout& layout, sensor::Camera& camer
                     layout.images->describe(id), *median));
   }
 
+  // Metres become 16 bits like all other depth
   camera.depth_scale = kFloatDepthScale;
   log.info("the depth images hold metres as floats; they are read in steps of 0.2 mm, up to 13.1 m");
   return {};

@@ -103,13 +103,13 @@ bool is_file(const std::filesystem::path& path);
 /// The number under that key; none if it is missing, not a number or not finite.
 std::optional<double> json_number(const nlohmann::ordered_json& object, const char* key);
 
-/// world_from_camera from what Apple's ARKit calls the camera's transform: there y points up and the camera
-/// looks along -z, in the world as in the camera. Here the world's z points up.
+/// world_from_camera from the camera's transform of Apple's ARKit, in which y points up and -z forward, for
+/// the world as for the camera. Here the world's z points up.
 geometry::Rigid3 from_arkit(const geometry::Rigid3& transform);
 
 /// The groups of digits of a name, left to right.
 std::vector<long long> numbers_of(const std::string& name);
-/// 4x4 world_from_camera in a file of its own; none where tracking was lost (NaN or infinity) or it is
+/// 4x4 world_from_camera in a separate file; none where tracking was lost (NaN or infinity) or it is
 /// unusable.
 std::optional<geometry::Rigid3> read_pose_file(const std::string& file);
 /// Images of a folder whose names have a number, by the first number in them; a number seen twice keeps the

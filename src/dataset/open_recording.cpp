@@ -44,6 +44,8 @@ std::string recordings_inside(const fs::path& folder) {
 core::Result<Layout> read_layout(const fs::path& folder, const std::string& format,
                                  const LayoutOptions& options, core::Log& log) {
   const bool any = format.empty() || format == "auto";
+
+  // A named format is not guessed
   for (const LayoutFormat* known : layout_formats()) {
     if (!any && format == known->name) return known->read(folder, options, log);
   }
@@ -52,7 +54,10 @@ core::Result<Layout> read_layout(const fs::path& folder, const std::string& form
         fmt::format("format '{}' is not known (allowed: {})", format, fmt::join(layout_names(), ", ")));
   }
 
+  // Without a name the files tell the layout
   if (const LayoutFormat* found = layout_of(folder)) return found->read(folder, options, log);
+
+  // The folder may hold several recordings
   const std::string inside = recordings_inside(folder);
   if (!inside.empty()) {
     return core::input_error(
@@ -104,7 +109,7 @@ void drop_same_stamps(const std::string& folder, Layout& layout, core::Log& log)
   pairs.erase(end, pairs.end());
 }
 
-/// The frames that a recording names, with those that are there.
+/// The frames that a recording names, with those that exist.
 struct ListedFrames {
   std::vector<double> stamps;
   std::vector<std::optional<std::size_t>> places;  ///< among the layout's pairs; none: a file is missing
@@ -135,12 +140,15 @@ core::Result<ListedFrames> leave_out_missing(const std::string& folder, Layout& 
     if (first.empty()) first = missing;
   }
 
+  // At least one frame must be complete
   const std::size_t all = layout.pairs.size();
   layout.pairs = std::move(there);
   if (layout.pairs.empty()) {
     return core::input_error(fmt::format(
         "{}: none of its {} frames has both its files; the first that is missing: {}", folder, all, first));
   }
+
+  // Frames without both files are reported
   if (layout.pairs.size() < all) {
     log.warning(
         fmt::format("{}: {} of {} frames are missing and left out: their files do not exist (the first: {})",
@@ -192,6 +200,7 @@ bool is_recording_file(const fs::path& file) {
 }
 
 core::Result<TrajectoryReading> recording_poses(const fs::path& folder, core::Log& log) {
+  // Numbered layouts need the camera's rate
   const auto chosen = choose_camera(folder, {}, log);
   LayoutOptions options;
   if (chosen && *chosen) options.fps = (*chosen)->reading.camera.fps;
@@ -208,6 +217,8 @@ core::Result<TrajectoryReading> recording_poses(const fs::path& folder, core::Lo
   reading.format = layout->format;
 
   for (const geometry::StampedPose& pose : reading.poses) reading.rows.push_back(pose.stamp);
+
+  // Odometry must not pass for ground truth
   if (layout->truth_is_odometry) {
     reading.notes.push_back(
         fmt::format("the {} poses to compare with are those of the recorder's own odometry, not ground truth",
@@ -259,10 +270,11 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
     layout_options.depth_delay_s = (*chosen)->reading.camera.depth_delay_s;
   }
 
+  // The frames that the recording lists, and its other data
   auto layout = read_with_body(folder, options, layout_options, log);
   if (!layout) return tl::unexpected(layout.error());
 
-  // Frames with stamps of their own, whose files exist.
+  // Frames with different stamps, whose files exist
   round_stamps(layout->pairs);
   drop_same_stamps(folder.string(), *layout, log);
   const auto listed = leave_out_missing(folder.string(), *layout, log);

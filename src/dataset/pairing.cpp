@@ -71,6 +71,8 @@ std::string no_common_time(const std::string& color_name, const std::vector<Stam
                            const std::string& depth_name, const std::vector<StampedFile>& depth,
                            double max_gap_s) {
   double nearest = std::numeric_limits<double>::infinity();
+
+  // Neighbours in time on both sides
   for (const StampedFile& c : color) {
     const auto after = std::lower_bound(depth.begin(), depth.end(), c.stamp, earlier);
     if (after != depth.end()) nearest = std::min(nearest, after->stamp - c.stamp);
@@ -86,18 +88,23 @@ std::string no_common_time(const std::string& color_name, const std::vector<Stam
 
 core::Result<void> check_files(const std::string& list, const std::vector<StampedFile>& files) {
   bool denied = false;
+
+  // One existing file is enough
   for (const StampedFile& file : files) {
     std::error_code why;
     if (std::filesystem::exists(file.file, why)) return {};
     if (&file == &files.front()) denied = why == std::errc::permission_denied;
   }
 
+  // Missing permission has another remedy
   const StampedFile& first = files.front();
   if (denied) {
     return core::input_error(
         fmt::format("{}:{}: names {}, which cannot be reached: no permission for its folder", list,
                     first.line, first.file));
   }
+
+  // If all files are missing, their place is wrong
   return core::input_error(
       fmt::format("{}:{}: names {}, which does not exist, and none of its {} files does; copy the image "
                   "folder beside the list or correct the list",

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 constexpr std::uintmax_t kMaxScannedBytes = 65536;  // of files that may be camera files by their content
 
-/// Names that camera files have beside recordings, in the order in which they are tried.
+/// Names of camera files in recordings' folders, in the order in which they are tried.
 constexpr std::array<const char*, 16> kCameraFiles = {"camera.yaml",
                                                       "camera_intrinsic.json",
                                                       "intrinsic.json",
@@ -60,6 +60,8 @@ std::vector<fs::path> foreign_camera_files(const fs::path& folder) {
 
 core::Result<std::optional<fs::path>> find_camera_file(const fs::path& folder, core::Log& log) {
   std::error_code ignored;
+
+  // Usual names, in order of preference
   for (std::size_t i = 0; i < kCameraFiles.size(); ++i) {
     const fs::path file = folder / kCameraFiles[i];
     if (!fs::exists(file, ignored)) continue;
@@ -68,9 +70,11 @@ core::Result<std::optional<fs::path>> find_camera_file(const fs::path& folder, c
     log.warning(fmt::format("{}: is not a known camera file; it is not used", file.string()));
   }
 
+  // Other programs choose the name freely
   const std::vector<fs::path> found = foreign_camera_files(folder);
   if (found.empty()) return std::nullopt;
 
+  // Several files may describe the same camera
   const auto first = sensor::read_camera_file(found.front());
   for (const fs::path& file : found) {
     const auto reading = sensor::read_camera_file(file);
@@ -89,7 +93,7 @@ geometry::Rigid3 scannet_extrinsic(const fs::path& file) {
   return is_file(file) ? read_pose_file(file.string()).value_or(geometry::Rigid3()) : geometry::Rigid3();
 }
 
-/// ScanNet has a calibration of depth beside that of colour; its size comes from the images.
+/// ScanNet has a separate calibration of depth; its size comes from the images.
 core::Result<void> add_depth_camera(const fs::path& folder, sensor::Camera& camera) {
   const fs::path file = folder / "intrinsic_depth.txt";
   if (!is_file(file)) return {};
@@ -123,6 +127,7 @@ std::optional<sensor::Camera> guessed_camera(const Layout& layout) {
     double focal_px;
   };
 
+  // Usual devices by the size of colour
   constexpr std::array<Device, 4> kDevices = {{
       {"Kinect or Xtion", 640, 480, 525.0},  // as their drivers and 7-Scenes, TUM and Redwood assume
       {"RealSense D400", 1280, 720, 920.0},  // 69 x 42 degrees by its data sheet
@@ -135,6 +140,7 @@ std::optional<sensor::Camera> guessed_camera(const Layout& layout) {
   for (const Device& device : kDevices) {
     if (*size != cv::Size(device.width, device.height)) continue;
 
+    // Without calibration the principal point is the centre
     sensor::Camera camera;
     camera.name = device.name;
     camera.color = {size->width,
@@ -143,9 +149,10 @@ std::optional<sensor::Camera> guessed_camera(const Layout& layout) {
                     device.focal_px,
                     0.5 * (size->width - 1),
                     0.5 * (size->height - 1)};
+
+    // Depth in the usual unit of the layout
     camera.depth_scale = usual_depth_scale(layout);
     camera.guess = true;
-
     return camera;
   }
 
@@ -157,6 +164,8 @@ std::string distortion_text(const sensor::Camera& camera) {
   const sensor::Distortion& k = camera.distortion;
   if (camera.model == sensor::LensModel::kEquidistant)
     return fmt::format("equidistant (fisheye) k1 {:g} k2 {:g} k3 {:g} k4 {:g}", k[0], k[1], k[2], k[3]);
+
+  // Higher terms only for lenses that have them
   const std::string more = k[5] != 0.0 || k[6] != 0.0 || k[7] != 0.0
                                ? fmt::format(" k4 {:g} k5 {:g} k6 {:g}", k[5], k[6], k[7])
                                : "";
@@ -197,6 +206,8 @@ void reduce_color(sensor::Camera& camera) {
 
 core::Result<cv::Size> size_in(const Layout& layout, ImageId PairInfo::*image) {
   if (const auto size = image_size(layout, image)) return *size;
+
+  // The first image's error stands for all
   const ImageId first = layout.pairs.front().*image;
   const auto read = layout.images->read(first);
   return core::input_error(fmt::format("{}; no {} image can be read to tell its size, and this is the first",
@@ -204,7 +215,7 @@ core::Result<cv::Size> size_in(const Layout& layout, ImageId PairInfo::*image) {
                                        first.list == ImageList::kDepth ? "depth" : "colour"));
 }
 
-/// Sizes that the camera file does not say, from the images.
+/// Sizes that the camera file lacks, from the images.
 core::Result<void> add_sizes(const ChosenCamera& chosen, const Layout& layout, sensor::Camera& camera) {
   if (!chosen.reading.has_size) {
     const auto size = size_in(layout, &PairInfo::color);
@@ -272,10 +283,13 @@ core::Result<sensor::Camera> guess(const fs::path& folder, const Layout& layout,
         has_place ? "camera.yaml in the folder; put one there or " : "calibration of its camera; "));
   }
 
+  // The guess is reported with its remedy
   std::string text = fmt::format(
       "{}: no {}; its images have the size of a {}, so fx = fy = {:g} is guessed; {}name one with --camera",
       folder.string(), has_place ? "camera.yaml" : "calibration of its camera", camera->name,
       camera->color.fx, has_place ? "put a camera.yaml there or " : "");
+
+  // The original depth of 7-Scenes is not registered
   if (layout.format == "7scenes") {
     text +=
         "; 7-Scenes as it is published has depth that is not registered to colour: --camera seven_scenes "
@@ -290,17 +304,22 @@ core::Result<sensor::Camera> guess(const fs::path& folder, const Layout& layout,
 
 core::Result<std::optional<ChosenCamera>> choose_camera(const fs::path& folder, const OpenOptions& options,
                                                         core::Log& log) {
+  // The user's choice comes first
   if (!options.camera.empty()) {
     auto reading = sensor::find_camera(options.camera, options.cameras_folder);
     if (!reading) return tl::unexpected(reading.error());
     return ChosenCamera{std::move(*reading), options.camera};
   }
+
+  // Only a folder can hold a camera file
   if (!is_folder(folder)) return std::nullopt;
   const auto file = find_camera_file(folder, log);
   if (!file) return tl::unexpected(file.error());
   if (!*file) return std::nullopt;
   auto reading = sensor::read_camera_file(**file);
   if (!reading) return tl::unexpected(reading.error());
+
+  // ScanNet keeps the depth camera in another file
   if ((*file)->filename() == "intrinsic_color.txt") {
     if (auto added = add_depth_camera((*file)->parent_path(), reading->camera); !added)
       return tl::unexpected(added.error());
@@ -311,6 +330,8 @@ core::Result<std::optional<ChosenCamera>> choose_camera(const fs::path& folder, 
 int stored_reduction(const Layout& layout, const sensor::Camera& camera) {
   const auto size = camera.depth ? color_size(layout) : std::nullopt;
   if (!size) return 1;
+
+  // Colour may be stored larger by a whole factor
   const int factor = size->width / camera.color.width;
   const bool whole =
       size->width == factor * camera.color.width && size->height == factor * camera.color.height;
@@ -319,15 +340,18 @@ int stored_reduction(const Layout& layout, const sensor::Camera& camera) {
 
 core::Result<sensor::Camera> complete_camera(const fs::path& folder, const std::optional<ChosenCamera>& given,
                                              Layout& layout, core::Log& log) {
+  // Option or camera file, the recording's camera, a guess
   std::optional<ChosenCamera> chosen = given;
   if (!chosen && layout.camera) chosen = ChosenCamera{*layout.camera, folder.string(), true};
   if (!chosen) return guess(folder, layout, log);
 
+  // A given camera replaces those of single frames
   if (!chosen->of_layout) {
     layout.frame_cameras.clear();
     for (PairInfo& pair : layout.pairs) pair.camera = -1;
   }
 
+  // Foreign files may lack sizes and the depth scale
   sensor::Camera camera = chosen->reading.camera;
   const bool foreign = !chosen->reading.program.empty();  // our own is complete, and checked
   if (foreign) {

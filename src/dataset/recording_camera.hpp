@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Which camera took a recording: named, found in its folder, or guessed by the size of its images.
+// The camera that took a recording: named, found in its folder, or guessed by the size of its images.
 #include <filesystem>
 #include <optional>
 #include <string>

@@ -12,6 +12,7 @@ core::Result<std::vector<std::size_t>> selected_frames(const std::string& name,
     return core::usage_error(fmt::format("every: {} is out of range (allowed: 1 or more)", options.every));
   }
 
+  // Counting begins with the first frame in the span
   std::vector<std::size_t> selected;
   std::size_t inside = 0;
   for (std::size_t i = 0; i < stamps.size(); ++i) {
@@ -21,6 +22,7 @@ core::Result<std::vector<std::size_t>> selected_frames(const std::string& name,
   }
   if (!selected.empty()) return selected;
 
+  // The error names the recording's true end
   const double duration_s = stamps.back() - stamps.front();
   if (options.to_s == OpenOptions().to_s) {
     return core::usage_error(

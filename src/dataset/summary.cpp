@@ -10,6 +10,8 @@
 #include "plumbline/core/numbers.hpp"
 
 namespace plumbline::dataset {
+
+/// Positions spread evenly, with the first and the last.
 std::vector<std::size_t> spread(std::size_t count, std::size_t samples) {
   std::vector<std::size_t> positions;
   samples = std::min(count, samples);
@@ -27,6 +29,7 @@ std::string to_text(const FrameSource& source) {
     text += fmt::format("missing: {} pairs, whose files do not exist\n", source.missing());
   text += fmt::format("pairs: {}\n", source.size());
 
+  // A median step, because gaps are not usual
   std::vector<double> steps;
   for (std::size_t i = 1; i < source.size(); ++i)
     steps.push_back(source.info(i).stamp - source.info(i - 1).stamp);
@@ -42,6 +45,7 @@ std::string to_text(const FrameSource& source) {
       camera.color.cy, camera.distorted() ? "undistorted while reading" : "no distortion",
       camera.color_from_depth ? "registered while reading" : "registered to colour", camera.depth_scale);
 
+  // A few frames tell the quality of depth
   DepthStatistics statistics;
   std::size_t read = 0;
   const std::vector<std::size_t> sampled = spread(source.size(), kSamples);
@@ -60,6 +64,7 @@ std::string to_text(const FrameSource& source) {
     text += fmt::format("depth: none in {} sampled frames\n", read);
   }
 
+  // Unreadable frames among the samples
   if (read < sampled.size())
     text += fmt::format("unreadable: {} of {} sampled frames\n", sampled.size() - read, sampled.size());
   const auto truth = source.truth();

@@ -12,6 +12,7 @@
 
 namespace plumbline::dataset {
 
+/// Words without empty ones: separators may repeat.
 std::vector<std::string> split_words(std::string_view text, std::string_view separators) {
   std::vector<std::string> words;
   for (std::size_t from = 0; (from = text.find_first_not_of(separators, from)) != std::string_view::npos;) {
@@ -31,6 +32,8 @@ core::Result<std::vector<RawLine>> read_raw_lines(const std::filesystem::path& f
   if (!stream || std::filesystem::is_directory(file, ignored)) {
     return core::input_error(fmt::format("{}: cannot be read: missing, or no permission", file.string()));
   }
+
+  // Only the first line has a mark of UTF-8
   std::vector<RawLine> lines;
   std::string text;
   for (int number = 1; lines.size() < most && std::getline(stream, text); ++number) {
@@ -42,6 +45,7 @@ core::Result<std::vector<RawLine>> read_raw_lines(const std::filesystem::path& f
   return lines;
 }
 
+/// Lines with words, without comments.
 core::Result<std::vector<TextLine>> read_lines(const std::filesystem::path& file) {
   const auto raw = read_raw_lines(file);
   if (!raw) return tl::unexpected(raw.error());

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Measurements of a body beside those of its camera.
+// Measurements of the body that carries a camera: inertial sensor and wheels.
 #include <Eigen/Core>
 #include <optional>
 #include <vector>
@@ -35,7 +35,7 @@ BodyReadings readings_between(const std::vector<ImuReading>& imu,
                               const std::vector<OdometryReading>& odometry, double imu_after,
                               double odometry_after, double until);
 
-/// A FrameSource that has such readings is this, too. Thread-safe.
+/// A FrameSource with such readings implements this, too. Thread-safe.
 class BodySource {
  public:
   virtual ~BodySource() = default;

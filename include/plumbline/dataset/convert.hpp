@@ -34,7 +34,7 @@ struct ConvertSummary {
 /// original. A frame with an image that cannot be read, is of another size or kind than the camera's, or is
 /// behind a link out of the recording's folder is left out and counted; warnings name the first five. Memory
 /// does not grow with the recording; `out` appears when all is written. Errors: kUsage
-/// (`out` is there and was not written by this function, or has an ending of files that are not
+/// (`out` exists and was not written by this function, or has an ending of files that are not
 /// written), kInput (no frame can be copied), kOutput.
 core::Result<ConvertSummary> convert_recording(const FrameSource& source, const std::filesystem::path& out,
                                                const ConvertOptions& options, core::Log& log);

@@ -61,7 +61,7 @@ struct RecordingNotes {
   bool truth_is_odometry = false;  ///< truth() is the path from the recorder's own odometry
 };
 
-/// Read access to one recording. All const methods are thread-safe: frames may be decoded side by side.
+/// Read access to one recording. All const methods are thread-safe: frames may be decoded in parallel.
 class FrameSource {
  public:
   virtual ~FrameSource() = default;

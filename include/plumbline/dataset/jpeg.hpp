@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// JPEG files in memory: pictures for pages, and keyframes' pictures for a map's store.
+// JPEG files in memory: images for pages, and keyframes' images for a map's store.
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
 #include <vector>
@@ -13,7 +13,7 @@ namespace plumbline::dataset {
 /// The bytes of a JPEG file; empty if it cannot be encoded. `bgr`: CV_8UC3; `quality`: 1 to 100. Thread-safe.
 std::vector<std::uint8_t> encode_jpeg(const cv::Mat& bgr, int quality);
 
-/// The picture reduced to a width of 160 pixels, in the best quality that fits into 5000 bytes; empty if none
+/// The image reduced to a width of 160 pixels, in the best quality that fits into 5000 bytes; empty if none
 /// does. `bgr`: CV_8UC3. Thread-safe.
 std::vector<std::uint8_t> encode_small_jpeg(const cv::Mat& bgr);
 

@@ -15,7 +15,7 @@ namespace plumbline::dataset {
 bool is_live_address(const std::string& input);
 
 /// Finds the topics and the camera as in a bag (OpenOptions::topics over what is found), takes messages in a
-/// thread of its own, and pairs them by stamp. Frames that arrive while LiveOptions::most_waiting_bytes of
+/// separate thread, and pairs them by stamp. Frames that arrive while LiveOptions::most_waiting_bytes of
 /// others wait are dropped before they get a number, as are those whose stamp is not later than the last
 /// one's; both are counted and reported. The source ends when LiveOptions::stop says so or its time is over.
 /// Errors: kInput (no camera

@@ -28,7 +28,7 @@ struct PlaySummary {
 };
 
 /// Publishes the frames of `source`: colour as raw images (JPEG as it is) below /camera/color, depth below
-/// /camera/aligned_depth_to_color, or below /camera/depth with /tf_static where it has a camera of its own;
+/// /camera/aligned_depth_to_color, or below /camera/depth with /tf_static where it has another camera;
 /// 16UC1 where it is in millimetres, else 32FC1 in metres; CameraInfo of both. Stamps are the recording's.
 /// Errors: kInput (no frame can be read), those of the sink.
 core::Result<PlaySummary> play_recording(const FrameSource& source, MessageSink& sink,

@@ -31,6 +31,8 @@ core::Result<BinaryFile> BinaryFile::open(const std::filesystem::path& file) {
   BinaryFile opened;
   opened.descriptor_ = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
   struct stat about {};
+
+  // Shortages of the system are not bad input
   if (const std::string shortage = opened.descriptor_ < 0 ? core::shortage_of(errno) : ""; !shortage.empty())
     return core::output_error(fmt::format("{}: cannot be read: {}", file.string(), shortage));
   if (opened.descriptor_ < 0 || fstat(opened.descriptor_, &about) != 0)
@@ -42,6 +44,8 @@ core::Result<BinaryFile> BinaryFile::open(const std::filesystem::path& file) {
 bool BinaryFile::read(std::uint64_t at, void* to, std::size_t count) const {
   if (at > size_ || count > size_ - at) return false;
   char* next = static_cast<char*>(to);
+
+  // One call may read only a part
   while (count > 0) {
     const ssize_t got = pread(descriptor_, next, count, static_cast<off_t>(at));
     if (got < 0 && errno == EINTR) continue;

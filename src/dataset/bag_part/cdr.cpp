@@ -118,6 +118,7 @@ DecodedMessage<std::int64_t> read_stamp(const std::uint8_t* head, std::size_t si
   return sample->sec * kNanoseconds + sample->nanosec;
 }
 
+/// sensor_msgs/Image; strings and pixels are copied.
 DecodedMessage<ImageMessage> read_image_message(const Bytes& bytes) {
   ImageSample sample;
   if (std::string wrong = sample.read(bytes.data(), bytes.size()); !wrong.empty())
@@ -139,6 +140,7 @@ DecodedMessage<CompressedImageMessage> read_compressed_message(const Bytes& byte
                                 bytes_of(sample->data._buffer, sample->data._length)};
 }
 
+/// sensor_msgs/CameraInfo; its rectification R is not used.
 DecodedMessage<CameraInfoMessage> read_camera_info(const Bytes& bytes) {
   CameraInfoSample sample;
   if (std::string wrong = sample.read(bytes.data(), bytes.size()); !wrong.empty())
@@ -167,6 +169,8 @@ DecodedMessage<std::vector<TransformMessage>> read_transforms(const Bytes& bytes
   for (std::uint32_t i = 0; i < sample->transforms._length; ++i) {
     const auto& from = sample->transforms._buffer[i];
     const geometry::Rigid3 motion = rigid_of(from.transform);
+
+    // Transforms that are not finite are left out
     if (!is_motion(motion)) continue;
     transforms.push_back({text_of(from.header.frame_id), text_of(from.child_frame_id), motion,
                           nanoseconds_of(from.header.stamp)});
@@ -174,6 +178,7 @@ DecodedMessage<std::vector<TransformMessage>> read_transforms(const Bytes& bytes
   return transforms;
 }
 
+/// geometry_msgs/Transform, such as RealSense's extrinsics.
 DecodedMessage<geometry::Rigid3> read_transform(const Bytes& bytes) {
   TransformSample sample;
   if (std::string wrong = sample.read(bytes.data(), bytes.size()); !wrong.empty())
@@ -197,11 +202,14 @@ DecodedMessage<ImuMessage> read_imu_message(const Bytes& bytes) {
   const auto vector = [](const geometry_msgs_msg_dds__Vector3_& v) { return Eigen::Vector3d(v.x, v.y, v.z); };
   ImuMessage message{header_of(sample->header), vector(sample->angular_velocity),
                      vector(sample->linear_acceleration)};
+
+  // The IMU must measure turn rates
   if (!message.turn_rate.allFinite())
     return tl::unexpected<std::string>("has a turn rate that is not finite");
   return message;
 }
 
+/// The pose of nav_msgs/Odometry; its velocity is not read.
 DecodedMessage<TransformMessage> read_odometry(const Bytes& bytes) {
   OdometrySample sample;
   if (std::string wrong = sample.read(bytes.data(), bytes.size()); !wrong.empty())
@@ -230,6 +238,8 @@ std_msgs_msg_dds__Header_ header_from(std::int64_t stamp_ns, const std::string& 
   std_msgs_msg_dds__Header_ header{};
   std::int64_t seconds = stamp_ns / kNanoseconds;
   std::int64_t rest = stamp_ns % kNanoseconds;
+
+  // Nanoseconds of ROS are never negative
   if (rest < 0) {
     rest += kNanoseconds;
     --seconds;
@@ -245,6 +255,8 @@ Bytes write_sample(const void* sample, const dds_topic_descriptor_t& descriptor)
   dds_ostreamLE_t stream;
   dds_ostreamLE_init(&stream, 0, kVersion1);
   const bool written = dds_stream_write_sampleLE(&stream, sample, &type);
+
+  // The kind of encoding precedes the message
   Bytes bytes(kEncapsulation + (written ? stream.x.m_index : 0U), 0);
   bytes[1] = 1;  // plain CDR, little endian
   if (written) std::memcpy(bytes.data() + kEncapsulation, stream.x.m_buffer, stream.x.m_index);
@@ -261,6 +273,7 @@ const MessageDecoder& cdr_decoder() {
   return decoder;
 }
 
+/// sensor_msgs/Image; strings and pixels are borrowed while it is written.
 Bytes encode_cdr(const ImageMessage& message) {
   sensor_msgs_msg_dds__Image_ sample{};
   sample.header = header_from(message.header.stamp_ns, message.header.frame_id);
@@ -287,10 +300,14 @@ Bytes encode_cdr(const CameraInfoMessage& message) {
   sample.height = message.height;
   sample.width = message.width;
   sample.distortion_model = borrowed(message.distortion_model);
+
+  // The encoder only reads the coefficients
   sample.d._length = sample.d._maximum = static_cast<std::uint32_t>(message.d.size());
   sample.d._buffer = const_cast<double*>(message.d.data());
   std::copy(message.k.begin(), message.k.end(), std::begin(sample.k));
   std::copy(message.p.begin(), message.p.end(), std::begin(sample.p));
+
+  // R turns nothing: there is one camera
   sample.r[0] = sample.r[4] = sample.r[8] = 1.0;
 
   sample.binning_x = message.binning_x;
@@ -300,6 +317,7 @@ Bytes encode_cdr(const CameraInfoMessage& message) {
   return write_sample(&sample, sensor_msgs_msg_dds__CameraInfo__desc);
 }
 
+/// tf2_msgs/TFMessage; all transforms have one stamp.
 Bytes encode_cdr(const std::vector<TransformMessage>& transforms, std::int64_t stamp_ns) {
   std::vector<geometry_msgs_msg_dds__TransformStamped_> samples;
   for (const TransformMessage& transform : transforms) {
@@ -318,6 +336,7 @@ Bytes encode_cdr(const std::vector<TransformMessage>& transforms, std::int64_t s
   return write_sample(&message, tf2_msgs_msg_dds__TFMessage__desc);
 }
 
+/// nav_msgs/Path; each pose has its own stamp.
 Bytes encode_cdr(const PathMessage& message) {
   std::vector<geometry_msgs_msg_dds__PoseStamped_> samples;
   samples.reserve(message.poses.size());
@@ -341,15 +360,19 @@ Bytes encode_cdr(const CloudMessage& message) {
   constexpr std::uint8_t kFloat32 = 7;
   constexpr std::uint32_t kPointBytes = 16;
   constexpr const char* kNames[] = {"x", "y", "z", "rgb"};
+
+  // Four floats a point: position and packed colour
   std::array<sensor_msgs_msg_dds__PointField_, 4> fields{};
   for (std::uint32_t i = 0; i < fields.size(); ++i)
     fields[i] = {const_cast<char*>(kNames[i]), i * 4U, kFloat32, 1};
 
+  // One row, because the points have no order
   sensor_msgs_msg_dds__PointCloud2_ cloud{};
   cloud.header = header_from(message.header.stamp_ns, message.header.frame_id);
   cloud.height = 1;
   cloud.width = message.points;
 
+  // Fields and points are borrowed
   cloud.fields._length = cloud.fields._maximum = static_cast<std::uint32_t>(fields.size());
   cloud.fields._buffer = fields.data();
   cloud.point_step = kPointBytes;
@@ -359,6 +382,7 @@ Bytes encode_cdr(const CloudMessage& message) {
   return write_sample(&cloud, sensor_msgs_msg_dds__PointCloud2__desc);
 }
 
+/// nav_msgs/OccupancyGrid; its axes are those of the frame.
 Bytes encode_grid(const GridMessage& message) {
   nav_msgs_msg_dds__OccupancyGrid_ grid{};
   grid.header = header_from(message.header.stamp_ns, message.header.frame_id);
@@ -372,6 +396,7 @@ Bytes encode_grid(const GridMessage& message) {
   return write_sample(&grid, nav_msgs_msg_dds__OccupancyGrid__desc);
 }
 
+/// A rectangle of cells that replaces those sent before.
 Bytes encode_grid_update(const GridMessage& message) {
   map_msgs_msg_dds__OccupancyGridUpdate_ update{};
   update.header = header_from(message.header.stamp_ns, message.header.frame_id);

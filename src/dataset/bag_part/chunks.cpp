@@ -9,11 +9,14 @@
 namespace plumbline::dataset {
 
 tl::expected<Bytes, std::string> read_chunk(const BinaryFile& file, const Chunk& chunk) {
+  // Sizes of damaged chunks are not allocated
   if (chunk.plain_size > kMostChunkBytes || chunk.data_size > kMostChunkBytes)
     return tl::unexpected<std::string>("is too large");
   Bytes packed(static_cast<std::size_t>(chunk.data_size));
   if (!file.read(chunk.data_at, packed.data(), packed.size()))
     return tl::unexpected<std::string>("cannot be read");
+
+  // Uncompressed data are used as they are
   Bytes plain;
   if (chunk.compression == Compression::kNone) {
     plain = std::move(packed);
@@ -21,6 +24,8 @@ tl::expected<Bytes, std::string> read_chunk(const BinaryFile& file, const Chunk&
     return tl::unexpected<std::string>("cannot be unpacked");
   }
   if (plain.size() != chunk.plain_size) return tl::unexpected<std::string>("ends too early");
+
+  // Writers without a checksum store 0
   if (chunk.crc != 0 && libdeflate_crc32(0, plain.data(), plain.size()) != chunk.crc)
     return tl::unexpected<std::string>("does not fit its checksum");
   return plain;
@@ -33,6 +38,7 @@ ChunkCursor::ChunkCursor(const BinaryFile& file, const Chunk& chunk) : file_(fil
   inflater_ = make_inflater(chunk.compression, packed_.data(), packed_.size());
 }
 
+/// Decompresses up to the position to which records were skipped.
 bool ChunkCursor::catch_up() {
   std::array<std::uint8_t, std::size_t{1} << 16> scratch;
   while (unpacked_ < position_) {
@@ -45,6 +51,7 @@ bool ChunkCursor::catch_up() {
 }
 
 bool ChunkCursor::get(std::uint8_t* to, std::size_t count) {
+  // Records must end within their chunk
   if (position_ > chunk_.plain_size || count > chunk_.plain_size - position_) return false;
   if (chunk_.compression == Compression::kNone) {
     if (!file_.read(chunk_.data_at + position_, to, count)) return false;

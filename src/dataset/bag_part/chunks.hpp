@@ -69,6 +69,8 @@ class ChunkCache {
     const std::lock_guard lock(mutex_);
     bytes_ += chunk->size();
     chunks_.emplace_front(at, std::move(chunk));
+
+    // The newest chunk stays, whatever its size
     while (bytes_ > kMostBytes && chunks_.size() > 1) {
       bytes_ -= chunks_.back().second->size();
       chunks_.pop_back();

@@ -47,6 +47,8 @@ class ZstdInflater final : public Inflater {
       const std::size_t read = input_.pos;
       const std::size_t written = output.pos;
       const std::size_t left = ZSTD_decompressStream(context_.get(), &output, &input_);
+
+      // Without progress the data are damaged or cut
       damaged_ = ZSTD_isError(left) != 0 || (input_.pos == read && output.pos == written);
     }
     return output.pos;
@@ -75,6 +77,8 @@ class Lz4Inflater final : public Inflater {
       std::size_t written = size - done;
       std::size_t read = size_;
       const std::size_t hint = LZ4F_decompress(context_.get(), to + done, &written, data_, &read, nullptr);
+
+      // Without progress the data are damaged or cut
       damaged_ = LZ4F_isError(hint) != 0U || (read == 0 && written == 0);
       if (LZ4F_isError(hint) != 0U) break;
       data_ += read;
@@ -109,6 +113,8 @@ class Bzip2Inflater final : public Inflater {
     while (done < size && !damaged_) {
       const auto room = static_cast<unsigned>(std::min(kStep, size - done));
       const auto fed = static_cast<unsigned>(std::min(kStep, left_));
+
+      // bzip2 counts down the bytes of both buffers
       stream_.next_out = reinterpret_cast<char*>(to + done);
       stream_.avail_out = room;
       stream_.avail_in = fed;
@@ -117,6 +123,8 @@ class Bzip2Inflater final : public Inflater {
       const std::size_t written = room - stream_.avail_out;
       left_ -= read;
       done += written;
+
+      // Without progress the data are damaged or cut
       damaged_ = state != BZ_OK || (read == 0 && written == 0);
     }
     return done;
@@ -128,6 +136,7 @@ class Bzip2Inflater final : public Inflater {
   bool damaged_ = false;
 };
 
+/// True if all bytes are written; one call may write only a part.
 bool write_all(int descriptor, const char* from, std::size_t size) {
   while (size > 0) {
     const ssize_t written = ::write(descriptor, from, size);
@@ -153,6 +162,8 @@ bool inflate_all(Compression compression, const std::uint8_t* data, std::size_t 
   constexpr std::size_t kFirstStep = std::size_t{1} << 16;
   const auto inflater = make_inflater(compression, data, size);
   to.clear();
+
+  // Growing steps, because the promised size may be wrong
   for (std::size_t step = kFirstStep;; step *= 2) {
     const std::size_t before = to.size();
     const std::size_t wanted = static_cast<std::size_t>(std::min<std::uint64_t>(step, most + 1 - before));
@@ -200,9 +211,9 @@ core::Result<TemporaryFile> TemporaryFile::inflated(const std::filesystem::path&
     return core::output_error(fmt::format("{}: no temporary file for what is compressed in it: {}",
                                           file.string(), std::strerror(errno)));
   }
-
   target.path_ = name;
 
+  // In steps, because the bag may exceed the memory
   std::ifstream stream(file, std::ios::binary);
   std::vector<char> packed(ZSTD_DStreamInSize());
   std::vector<char> plain(ZSTD_DStreamOutSize());
@@ -214,6 +225,8 @@ core::Result<TemporaryFile> TemporaryFile::inflated(const std::filesystem::path&
   while (!cut &&
          (stream.read(packed.data(), static_cast<std::streamsize>(packed.size())), stream.gcount() > 0)) {
     ZSTD_inBuffer input{packed.data(), static_cast<std::size_t>(stream.gcount()), 0};
+
+    // Full output may leave more of the same input
     bool full = false;
     while (!cut && (input.pos < input.size || full)) {
       ZSTD_outBuffer output{plain.data(), plain.size(), 0};
@@ -221,6 +234,7 @@ core::Result<TemporaryFile> TemporaryFile::inflated(const std::filesystem::path&
       cut = ZSTD_isError(left) != 0;
       full = output.pos == output.size;
 
+      // A full disk is not the bag's fault
       if (!write_all(target.descriptor_, plain.data(), output.pos)) {
         return core::output_error(
             fmt::format("{}: what is compressed in it does not fit into the folder of temporary files: {}; "
@@ -230,6 +244,7 @@ core::Result<TemporaryFile> TemporaryFile::inflated(const std::filesystem::path&
     }
   }
 
+  // A frame without its end was cut off
   cut = cut || left != 0;
   return target;
 }

@@ -88,6 +88,7 @@ core::Result<void> Db3File::prepare() {
   sqlite3_db_config(db, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
   sqlite3_limit(db, SQLITE_LIMIT_LENGTH, static_cast<int>(kMostMessageBytes));
 
+  // Topics are numbered in the order of ids
   const Statement topics = statement("SELECT id, name, type, serialization_format FROM topics ORDER BY id");
   if (topics != nullptr) {
     while (sqlite3_step(topics.get()) == SQLITE_ROW) {
@@ -97,6 +98,7 @@ core::Result<void> Db3File::prepare() {
     }
   }
 
+  // One statement for all messages
   read_ = statement("SELECT data FROM messages WHERE id = ?");
   if (topics != nullptr && read_ != nullptr) return {};
   return core::input_error(fmt::format("{}: is not a rosbag2 bag, or is damaged at its beginning: {}", shown_,
@@ -126,11 +128,14 @@ core::Result<void> Db3File::scan(const Visit& visit) {
   std::unique_ptr<sqlite3_blob, CloseBlob> blob;
   std::size_t seen = 0;
 
+  // Rows up to the first damaged page
   int step = SQLITE_ERROR;
   while (rows != nullptr && (step = sqlite3_step(rows.get())) == SQLITE_ROW) {
     const std::int64_t row = sqlite3_column_int64(rows.get(), 0);
     const auto topic = topic_of_id_.find(sqlite3_column_int64(rows.get(), 1));
     const std::int64_t size = sqlite3_column_int64(rows.get(), 3);
+
+    // Unknown topics and damaged sizes are skipped
     if (topic == topic_of_id_.end() || size < 0 || size > static_cast<std::int64_t>(kMostMessageBytes))
       continue;
 
@@ -140,6 +145,7 @@ core::Result<void> Db3File::scan(const Visit& visit) {
     entry.place.at = static_cast<std::uint64_t>(row);
     entry.place.size = static_cast<std::uint32_t>(size);
 
+    // The message's stamp is in its head
     const Bytes head = head_of(blob, row, entry.place.size);
     entry.head = head.data();
     entry.head_size = head.size();
@@ -147,6 +153,7 @@ core::Result<void> Db3File::scan(const Visit& visit) {
     visit(entry);
   }
 
+  // Messages before the damage are used
   if (step == SQLITE_DONE) return {};
   notes_.push_back(fmt::format("{}: is cut off or damaged after {} messages ({}); what is before is used",
                                shown_, seen, sqlite3_errmsg(database_.get())));
@@ -154,6 +161,7 @@ core::Result<void> Db3File::scan(const Visit& visit) {
 }
 
 core::Result<Bytes> Db3File::read(const MessagePlace& place) const {
+  // One statement serves all threads
   const std::lock_guard lock(mutex_);
   sqlite3_stmt* const row = read_.get();
   sqlite3_reset(row);
@@ -170,6 +178,7 @@ core::Result<Bytes> Db3File::read(const MessagePlace& place) const {
   return bytes;
 }
 
+/// For reading only; null if it cannot be opened.
 Database open_database(const std::filesystem::path& file, const char* mode) {
   sqlite3* opened = nullptr;
   const int done = sqlite3_open_v2(uri_of(file, mode).c_str(), &opened,
@@ -182,7 +191,7 @@ Database open_database(const std::filesystem::path& file, const char* mode) {
 }  // namespace
 
 OpenedBag open_db3(const std::filesystem::path& file, const std::string& shown) {
-  // A journal beside the file can only be read if files may be made beside it; otherwise it is ignored.
+  // A journal can only be read if files may be made in its folder; otherwise it is ignored.
   core::Error first;
   std::error_code ignored;
   const bool journal = std::filesystem::exists(file.string() + "-wal", ignored);

@@ -6,7 +6,7 @@
 
 namespace plumbline::dataset {
 
-/// `shown`: what messages call the file. What a recorder that was killed left in FILE-wal is read too.
+/// `shown`: name of the file in messages. What a recorder that was killed left in FILE-wal is read too.
 /// Error (kInput): no database, or not of rosbag2.
 OpenedBag open_db3(const std::filesystem::path& file, const std::string& shown);
 

@@ -59,6 +59,7 @@ class McapFile final : public BagFile {
 };
 
 core::Result<void> McapFile::scan(const Visit& visit) {
+  // Record by record: a cut file has no index
   std::uint64_t at = kMcapMagic.size();
   bool ended = false;
   while (!ended) {
@@ -69,6 +70,7 @@ core::Result<void> McapFile::scan(const Visit& visit) {
     const auto size = McapFields(head.data() + 1, head.size() - 1).number<std::uint64_t>();
     at += kRecordHead;
 
+    // A cut file ends within a record
     if (head[0] == 0 || size > file_.size() - at) {
       at -= kRecordHead;
       break;
@@ -79,11 +81,13 @@ core::Result<void> McapFile::scan(const Visit& visit) {
     at += size;
   }
 
+  // Messages before the damage are used
   if (!ended) {
     notes_.push_back(fmt::format("{}: is cut off or damaged at byte {} of {}; what is before is used", shown_,
                                  at, file_.size()));
   }
 
+  // The first damaged chunk is described
   if (damaged_chunks_ > 0) {
     notes_.push_back(
         fmt::format("{}: {} chunks are damaged and their messages lost; the first, at byte {}, {}", shown_,
@@ -94,6 +98,7 @@ core::Result<void> McapFile::scan(const Visit& visit) {
 }
 
 void McapFile::scan_record(McapOpcode opcode, std::uint64_t at, std::uint64_t size, const Visit& visit) {
+  // Messages are in chunks or stand alone
   if (opcode == McapOpcode::kChunk) {
     scan_chunk(at, size, visit);
   } else if (opcode == McapOpcode::kMessage) {
@@ -105,10 +110,13 @@ void McapFile::scan_record(McapOpcode opcode, std::uint64_t at, std::uint64_t si
       next += count;
       return there;
     };
+
+    // This message is outside any chunk
     scan_message(get, {at + kMessageHead, kNoChunk, static_cast<std::uint32_t>(size - kMessageHead), 0},
                  visit);
   } else if (opcode == McapOpcode::kSchema || opcode == McapOpcode::kChannel ||
              opcode == McapOpcode::kMetadata) {
+    // Sizes of damaged records are not allocated
     if (size > kMostRecordBytes) return;
     Bytes content(static_cast<std::size_t>(size));
     if (file_.read(at, content.data(), content.size())) add_definition(opcode, content);
@@ -126,8 +134,12 @@ void McapFile::scan_chunk(std::uint64_t at, std::uint64_t size, const Visit& vis
     wrong = "is too large";
   } else {
     ChunkCursor records(file_, *chunk);
+
+    // Records before the damage are visited
     if (!scan_records(records, *chunk, at, visit)) wrong = "cannot be unpacked or does not hold records";
   }
+
+  // The first damaged chunk stands for all
   if (wrong.empty()) return;
   if (damaged_chunks_++ > 0) return;
   first_damaged_ = at - kRecordHead;
@@ -142,8 +154,11 @@ bool McapFile::scan_records(ChunkCursor& records, const Chunk& chunk, std::uint6
     const auto opcode = static_cast<McapOpcode>(head[0]);
     const auto size = McapFields(head.data() + 1, head.size() - 1).number<std::uint64_t>();
     const std::uint64_t begin = records.position();
+
+    // A record must end within its chunk
     if (size > chunk.plain_size - begin) return false;
 
+    // Messages are unpacked only up to their stamps
     if (opcode == McapOpcode::kMessage) {
       if (size < kMessageHead || size - kMessageHead > kMostMessageBytes) return false;
       const auto get = [&records](std::uint8_t* to, std::size_t count) { return records.get(to, count); };
@@ -151,6 +166,8 @@ bool McapFile::scan_records(ChunkCursor& records, const Chunk& chunk, std::uint6
       if (!scan_message(get, {at, begin + kMessageHead, payload, 0}, visit)) return false;
     } else if (opcode == McapOpcode::kSchema || opcode == McapOpcode::kChannel) {
       if (size > kMostRecordBytes) return false;
+
+      // Definitions are unpacked completely
       Bytes content(static_cast<std::size_t>(size));
       if (!records.get(content.data(), content.size())) return false;
       add_definition(opcode, content);
@@ -171,6 +188,7 @@ bool McapFile::scan_message(const Get& get, MessagePlace place, const Visit& vis
   entry.head_size = std::min<std::size_t>(place.size, kHeadBytes);
   if (!get(fixed.data(), fixed.size()) || !get(head.data(), entry.head_size)) return false;
 
+  // The channel tells the topic
   McapFields fields(fixed.data(), fixed.size());
   const auto topic = topic_of_channel_.find(fields.number<std::uint16_t>());
   fields.skip(sizeof(std::uint32_t));  // sequence number
@@ -178,6 +196,7 @@ bool McapFile::scan_message(const Get& get, MessagePlace place, const Visit& vis
   if (topic == topic_of_channel_.end()) return true;
   entry.topic = topic->second;
 
+  // Messages may be compressed one by one
   Bytes unpacked;
   if (is_zstd(head.data(), entry.head_size)) {
     Bytes packed(head.data(), head.data() + entry.head_size);
@@ -194,6 +213,8 @@ bool McapFile::scan_message(const Get& get, MessagePlace place, const Visit& vis
 
 void McapFile::add_definition(McapOpcode opcode, const Bytes& content) {
   McapFields fields(content.data(), content.size());
+
+  // Channels refer to schemas before them
   if (opcode == McapOpcode::kSchema) {
     const auto id = fields.number<std::uint16_t>();
     const std::string name = fields.text();
@@ -219,6 +240,8 @@ void McapFile::add_channel(McapFields& fields) {
   if (!fields.good()) return;
   const auto type = schemas_.find(schema);
   if (type != schemas_.end()) topic.type = type->second;
+
+  // Several channels may be one topic
   const auto same = [&topic](const BagTopic& other) {
     return std::tie(topic.name, topic.type, topic.encoding) ==
            std::tie(other.name, other.type, other.encoding);
@@ -229,6 +252,7 @@ void McapFile::add_channel(McapFields& fields) {
 }
 
 core::Result<ChunkCache::Records> McapFile::chunk_at(std::uint64_t at) const {
+  // Neighbouring messages share a chunk
   if (auto known = chunks_.find(at)) return known;
   const auto head = read_chunk_head(file_, at, file_.size() - std::min(at, file_.size()));
   tl::expected<Bytes, std::string> plain = tl::unexpected<std::string>("has a damaged head");
@@ -244,6 +268,8 @@ core::Result<ChunkCache::Records> McapFile::chunk_at(std::uint64_t at) const {
 
 core::Result<Bytes> McapFile::read(const MessagePlace& place) const {
   Bytes bytes;
+
+  // Files without chunks hold plain messages
   if (place.offset == kNoChunk) {
     bytes.resize(place.size);
     if (!file_.read(place.at, bytes.data(), bytes.size()))
@@ -262,6 +288,7 @@ core::Result<Bytes> McapFile::read(const MessagePlace& place) const {
     bytes.assign(begin, begin + place.size);
   }
 
+  // Messages may be compressed one by one
   if (!unpack_message(bytes)) {
     return core::input_error(fmt::format("{}: the message at byte {} cannot be unpacked", shown_, place.at));
   }
@@ -280,6 +307,8 @@ bool is_mcap(const std::filesystem::path& file) {
 OpenedBag open_mcap(const std::filesystem::path& file, const std::string& shown) {
   auto opened = BinaryFile::open(file);
   if (!opened) return tl::unexpected(opened.error());
+
+  // MCAP is known by its first bytes
   std::array<std::uint8_t, kMcapMagic.size()> magic{};
   if (!opened->read(0, magic.data(), magic.size()) || magic != kMcapMagic)
     return core::input_error(shown + ": is no MCAP file");

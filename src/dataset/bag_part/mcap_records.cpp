@@ -11,6 +11,7 @@ std::optional<Chunk> read_chunk_head(const BinaryFile& file, std::uint64_t at, s
   const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(size, kMostHead));
   if (!file.read(at, head.data(), count)) return std::nullopt;
 
+  // Fields in the order of the format
   McapFields fields(head.data(), count);
   Chunk chunk;
   fields.skip(2 * sizeof(std::uint64_t));  // first and last time
@@ -21,6 +22,7 @@ std::optional<Chunk> read_chunk_head(const BinaryFile& file, std::uint64_t at, s
   chunk.data_at = at + fields.position();
   if (!fields.good() || chunk.data_size > size - fields.position()) return std::nullopt;
 
+  // Unknown compressions are reported by name
   if (compression == "zstd") {
     chunk.compression = Compression::kZstd;
   } else if (compression == "lz4") {
@@ -29,6 +31,7 @@ std::optional<Chunk> read_chunk_head(const BinaryFile& file, std::uint64_t at, s
     chunk.unknown = compression;
   }
 
+  // Uncompressed chunks have equal sizes
   const bool stored_plain = chunk.compression == Compression::kNone && chunk.unknown.empty();
   if (stored_plain && chunk.plain_size != chunk.data_size) return std::nullopt;
   return chunk;

@@ -37,6 +37,7 @@ class McapFields {
  public:
   McapFields(const std::uint8_t* data, std::size_t size) : data_(data), size_(size) {}
 
+  /// 0 if the record ends before it.
   template <typename Number>
   Number number() {
     Number value{};

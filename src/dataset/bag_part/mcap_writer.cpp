@@ -138,16 +138,22 @@ class McapWriter final : public BagWriter {
 
 std::uint16_t McapWriter::channel_of(const std::string& topic, const std::string& type) {
   if (const auto known = channels_.find(topic); known != channels_.end()) return known->second;
+
+  // The summary repeats all definitions
   const auto append = [this](const Bytes& definition) {
     records_.insert(records_.end(), definition.begin(), definition.end());
     definitions_.insert(definitions_.end(), definition.begin(), definition.end());
   };
+
+  // Topics of one type share a schema
   if (schemas_.count(type) == 0) {
     const auto id = static_cast<std::uint16_t>(schemas_.size() + 1);
     schemas_[type] = id;
     append(record(McapOpcode::kSchema,
                   RecordFields().number(id).text(type).text("ros2msg").text(message_definition(type))));
   }
+
+  // Channels are numbered by their first messages
   const auto id = static_cast<std::uint16_t>(channels_.size());
   channels_[topic] = id;
   append(
@@ -159,11 +165,14 @@ std::uint16_t McapWriter::channel_of(const std::string& topic, const std::string
 void McapWriter::add(const std::string& topic, const std::string& type, std::int64_t log_ns,
                      const Bytes& message) {
   const std::uint16_t channel = channel_of(topic, type);
+
+  // The chunk's time span and index
   const bool first = spots_.empty();
   chunk_first_ns_ = first ? log_ns : std::min(chunk_first_ns_, log_ns);
   chunk_last_ns_ = first ? log_ns : std::max(chunk_last_ns_, log_ns);
   spots_[channel].push_back({log_ns, records_.size()});
 
+  // The writer has one clock: both times are equal
   const auto sequence = static_cast<std::uint32_t>(counts_[channel]++);
   const Bytes written =
       record(McapOpcode::kMessage,
@@ -184,6 +193,7 @@ void McapWriter::flush() {
   chunk.packed_size = packed.size();
   chunk.plain_size = records_.size();
 
+  // The checksum is that of the plain records
   put(record(McapOpcode::kChunk, RecordFields()
                                      .number(chunk.first_ns)
                                      .number(chunk.last_ns)
@@ -193,6 +203,7 @@ void McapWriter::flush() {
                                      .number(chunk.packed_size)
                                      .bytes(packed)));
 
+  // Indices of messages follow their chunk
   chunk.record_size = at_ - chunk.at;
   put_indices(chunk);
   chunks_.push_back(std::move(chunk));
@@ -203,6 +214,7 @@ void McapWriter::flush() {
 void McapWriter::put_indices(WrittenChunk& chunk) {
   const std::uint64_t begin = at_;
   for (auto& [channel, spots] : spots_) {
+    // Readers search messages by time
     std::stable_sort(spots.begin(), spots.end(),
                      [](const MessageSpot& a, const MessageSpot& b) { return a.log_ns < b.log_ns; });
     RecordFields entries;
@@ -213,6 +225,7 @@ void McapWriter::put_indices(WrittenChunk& chunk) {
   chunk.index_size = at_ - begin;
 }
 
+/// Readers find a chunk by its time span, without unpacking it.
 Bytes McapWriter::chunk_index(const WrittenChunk& chunk) const {
   RecordFields indices;
   for (const auto& [channel, at] : chunk.index_at) indices.number(channel).number(at);
@@ -236,6 +249,7 @@ Bytes McapWriter::statistics() const {
     messages += count;
   }
 
+  // A bag without messages has the span 0 to 0
   std::int64_t first = chunks_.empty() ? 0 : std::numeric_limits<std::int64_t>::max();
   std::int64_t last = 0;
   for (const WrittenChunk& chunk : chunks_) {
@@ -261,6 +275,7 @@ core::Result<void> McapWriter::finish() {
   flush();
   put(record(McapOpcode::kDataEnd, RecordFields().number(kNoCrc)));
 
+  // Readers begin with the summary
   const std::uint64_t summary = at_;
   put(definitions_);
   put(statistics());
@@ -268,6 +283,8 @@ core::Result<void> McapWriter::finish() {
   if (metadata_size_ > 0) {
     put(record(kMetadataIndex, RecordFields().number(metadata_at_).number(metadata_size_).text("plumbline")));
   }
+
+  // The footer tells where the summary begins
   put(record(McapOpcode::kFooter, RecordFields().number(summary).number(std::uint64_t{0}).number(kNoCrc)));
   put(Bytes(kMcapMagic.begin(), kMcapMagic.end()));
   return file_.commit();

@@ -47,6 +47,7 @@ std::string with_header(const char* text) {
 
 }  // namespace
 
+/// A definition contains those of all its parts; "" if the type is not written.
 std::string message_definition(const std::string& type) {
   if (type == "sensor_msgs/msg/Image") return with_header(kImage);
   if (type == "sensor_msgs/msg/CompressedImage") return with_header(kCompressedImage);

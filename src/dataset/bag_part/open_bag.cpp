@@ -41,6 +41,7 @@ class UnpackedBag final : public BagFile {
   std::vector<std::string> notes_;
 };
 
+/// The content decides, whatever the file's name.
 OpenedBag open_plain(const std::filesystem::path& file, const std::string& shown) {
   if (is_mcap(file)) return open_mcap(file, shown);
   const auto opened = BinaryFile::open(file);
@@ -59,11 +60,14 @@ OpenedBag open_bag_file(const std::filesystem::path& file) {
   const bool packed = opened->read(0, magic.data(), magic.size()) && is_zstd(magic.data(), magic.size());
   if (!packed) return open_plain(file, file.string());
 
+  // rosbag2 can compress a whole file
   bool cut = false;
   auto temporary = TemporaryFile::inflated(file, cut);
   if (!temporary) return tl::unexpected(temporary.error());
   auto bag = open_plain(temporary->path(), file.string());
   if (!bag) return bag;
+
+  // A file without a name vanishes with the program
   temporary->take_name_away();
   auto unpacked = std::make_unique<UnpackedBag>(std::move(*temporary), std::move(*bag));
   if (cut) unpacked->add_note(file.string() + ": is cut off or damaged; what could be unpacked is used");

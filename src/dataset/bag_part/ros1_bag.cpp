@@ -118,6 +118,8 @@ Chunk chunk_of(const BagRecord& record, std::uint64_t at) {
   chunk.plain_size = record.fields.number<std::uint32_t>("size");
   chunk.data_at = at;
   chunk.data_size = record.data_size;
+
+  // Unknown compressions are reported by name
   const std::string compression = record.fields.text("compression");
   if (compression == "bz2") {
     chunk.compression = Compression::kBzip2;
@@ -139,9 +141,9 @@ core::Result<void> Ros1Bag::scan(const Visit& visit) {
     return true;
   };
 
+  // Records up to the first that is cut off
   std::uint64_t begin = at;
   bool whole = true;
-
   while (whole && (begin = at) < file_.size()) {
     const auto record = next_record(get);
     whole = record && record->data_size <= file_.size() - at;
@@ -174,6 +176,7 @@ core::Result<void> Ros1Bag::scan(const Visit& visit) {
     at = data + record->data_size;
   }
 
+  // Records before the damage are used
   if (!whole) {
     notes_.push_back(fmt::format("{}: is cut off or damaged at byte {} of {}; what is before is used", shown_,
                                  begin, file_.size()));
@@ -189,6 +192,8 @@ template <typename Get>
 bool Ros1Bag::scan_inner(const BagRecord& record, const Get& get_data, MessagePlace place,
                          const Visit& visit) {
   Get get = get_data;
+
+  // Connections define the topics
   if (record.op == kOpConnection) {
     if (record.data_size > kMostConnection) return false;
     Bytes data(record.data_size);
@@ -200,6 +205,7 @@ bool Ros1Bag::scan_inner(const BagRecord& record, const Get& get_data, MessagePl
   if (record.op != kOpMessage) return true;
   if (record.data_size > kMostMessageBytes) return false;
 
+  // The message's stamp is in its head
   std::array<std::uint8_t, kHeadBytes> head{};
   BagEntry entry;
   entry.place = place;
@@ -211,6 +217,7 @@ bool Ros1Bag::scan_inner(const BagRecord& record, const Get& get_data, MessagePl
   if (topic == topic_of_connection_.end()) return true;
   entry.topic = topic->second;
 
+  // Seconds and nanoseconds share a number
   const auto time = record.fields.number<std::uint64_t>("time");  // seconds, nanoseconds
   entry.log_ns =
       static_cast<std::int64_t>(time & 0xFFFFFFFFU) * 1'000'000'000 + static_cast<std::int64_t>(time >> 32);
@@ -223,6 +230,8 @@ bool Ros1Bag::scan_chunk(const Chunk& chunk, const Visit& visit) {
   chunks_[chunk.data_at] = chunk;
   ChunkCursor cursor(file_, chunk);
   const auto get = [&cursor](std::uint8_t* to, std::size_t count) { return cursor.get(to, count); };
+
+  // Places are counted in the unpacked chunk
   while (cursor.position() < chunk.plain_size) {
     const auto record = next_record(get);
     const std::uint64_t begin = cursor.position();
@@ -237,6 +246,8 @@ void Ros1Bag::add_connection(const BagFields& fields, const Bytes& data) {
   BagFields about;
   if (!about.read(data)) return;
   BagTopic topic{fields.text("topic"), about.text("type"), "ros1"};
+
+  // Several connections may be one topic
   const auto same = [&topic](const BagTopic& other) {
     return std::tie(topic.name, topic.type) == std::tie(other.name, other.type);
   };
@@ -247,6 +258,7 @@ void Ros1Bag::add_connection(const BagFields& fields, const Bytes& data) {
 }
 
 core::Result<ChunkCache::Records> Ros1Bag::records_of(std::uint64_t at) const {
+  // Neighbouring messages share a chunk
   if (auto known = cache_.find(at)) return known;
   const auto chunk = chunks_.find(at);
   tl::expected<Bytes, std::string> plain = tl::unexpected<std::string>("is not known");
@@ -260,6 +272,8 @@ core::Result<ChunkCache::Records> Ros1Bag::records_of(std::uint64_t at) const {
 
 core::Result<Bytes> Ros1Bag::read(const MessagePlace& place) const {
   Bytes bytes;
+
+  // Messages outside chunks are not compressed
   if (place.offset == kOutsideChunks) {
     bytes.resize(place.size);
     if (file_.read(place.at, bytes.data(), bytes.size())) return bytes;
@@ -267,6 +281,8 @@ core::Result<Bytes> Ros1Bag::read(const MessagePlace& place) const {
   }
   const auto records = records_of(place.at);
   if (!records) return tl::unexpected(records.error());
+
+  // The file may have changed since its survey
   const Bytes& plain = **records;
   if (place.offset > plain.size() || place.size > plain.size() - place.offset)
     return core::input_error(fmt::format("{}: the chunk with data at byte {} is damaged", shown_, place.at));
@@ -280,6 +296,8 @@ core::Result<Bytes> Ros1Bag::read(const MessagePlace& place) const {
 OpenedBag open_ros1_bag(const std::filesystem::path& file, const std::string& shown) {
   auto opened = BinaryFile::open(file);
   if (!opened) return tl::unexpected(opened.error());
+
+  // ROS 1 names the version in the first line
   std::array<char, kBagVersion.size()> version{};
   if (!opened->read(0, version.data(), version.size()) ||
       std::string_view(version.data(), version.size()) != kBagVersion) {

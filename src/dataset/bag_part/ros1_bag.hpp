@@ -7,7 +7,7 @@
 
 namespace plumbline::dataset {
 
-/// `shown`: what messages call the file. Error (kInput): cannot be read, of an older format, encrypted.
+/// `shown`: name of the file in messages. Error (kInput): cannot be read, of an older format, encrypted.
 OpenedBag open_ros1_bag(const std::filesystem::path& file, const std::string& shown);
 
 }  // namespace plumbline::dataset

@@ -57,6 +57,7 @@ class Ros1Fields {
 
  private:
   const std::uint8_t* take(std::size_t count) {
+    // Nothing is read after the first missing byte
     good_ = good_ && count <= left_;
     if (!good_) return nullptr;
     const std::uint8_t* from = data_;
@@ -87,6 +88,7 @@ DecodedMessage<std::int64_t> ros1_stamp(const std::uint8_t* head, std::size_t si
   return whole(fields, stamp);
 }
 
+/// sensor_msgs/Image in ROS 1's order of fields.
 DecodedMessage<ImageMessage> ros1_image(const Bytes& bytes) {
   Ros1Fields fields(bytes);
   ImageMessage message;
@@ -100,6 +102,7 @@ DecodedMessage<ImageMessage> ros1_image(const Bytes& bytes) {
   return whole(fields, std::move(message));
 }
 
+/// sensor_msgs/CompressedImage in ROS 1's order of fields.
 DecodedMessage<CompressedImageMessage> ros1_compressed_image(const Bytes& bytes) {
   Ros1Fields fields(bytes);
   CompressedImageMessage message;
@@ -116,16 +119,21 @@ DecodedMessage<CameraInfoMessage> ros1_camera_info(const Bytes& bytes) {
   message.height = fields.number<std::uint32_t>();
   message.width = fields.number<std::uint32_t>();
   message.distortion_model = fields.text();
+
+  // A damaged count must not allocate memory
   const auto coefficients = fields.number<std::uint32_t>();
   if (coefficients > fields.left() / sizeof(double))
     return tl::unexpected<std::string>("has more coefficients than bytes");
   message.d.resize(coefficients);
   fields.numbers(message.d);
   fields.numbers(message.k);
+
+  // R stands between K and P and is not used
   std::array<double, 9> rectification{};
   fields.numbers(rectification);
   fields.numbers(message.p);
 
+  // Binning and region of interest come last
   message.binning_x = fields.number<std::uint32_t>();
   message.binning_y = fields.number<std::uint32_t>();
   message.roi.x_offset = fields.number<std::uint32_t>();
@@ -146,6 +154,8 @@ DecodedMessage<std::vector<TransformMessage>> ros1_transforms(const Bytes& bytes
     transform.stamp_ns = header.stamp_ns;
     transform.child = fields.text();
     transform.parent_from_child = fields.transform();
+
+    // Transforms that are not finite are left out
     if (fields.good() && is_finite(transform.parent_from_child)) transforms.push_back(std::move(transform));
   }
   return whole(fields, std::move(transforms));
@@ -172,11 +182,14 @@ DecodedMessage<ImuMessage> ros1_imu(const Bytes& bytes) {
   fields.numbers(v);
   message.turn_rate = {v[13], v[14], v[15]};
   message.acceleration = {v[25], v[26], v[27]};
+
+  // The IMU must measure turn rates
   if (!message.turn_rate.allFinite())
     return tl::unexpected<std::string>("has a turn rate that is not finite");
   return whole(fields, std::move(message));
 }
 
+/// The pose of nav_msgs/Odometry; its velocity is not read.
 DecodedMessage<TransformMessage> ros1_odometry(const Bytes& bytes) {
   Ros1Fields fields(bytes);
   TransformMessage message;

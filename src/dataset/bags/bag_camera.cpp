@@ -58,14 +58,14 @@ tl::expected<sensor::Lens, std::string> lens_of(const CameraInfoMessage& info) {
   return lens;
 }
 
-/// The camera of a message: of the full picture, and of the images that it accompanies.
+/// The camera of a message: of the full image, and of the images that it accompanies.
 struct InfoPinholes {
   sensor::Pinhole full;
   sensor::Pinhole image;
   [[nodiscard]] bool differ() const { return full.width != image.width || full.height != image.height; }
 };
 
-/// Size and offset along one axis of the image that is made of the full picture.
+/// Size and offset along one axis of the image that is made of the full one.
 struct InfoAxis {
   std::uint32_t full = 0;
   std::uint32_t offset = 0;
@@ -73,7 +73,7 @@ struct InfoAxis {
   std::uint32_t binning = 1;  ///< 0 means 1
 };
 
-/// The axis with both zeros replaced by what they mean; none if the region does not fit in the full picture.
+/// The axis with its defaults (0) filled in; none if the region does not fit into the full image.
 std::optional<InfoAxis> complete_axis(InfoAxis axis) {
   if (axis.offset >= axis.full) return std::nullopt;
   if (axis.region == 0) axis.region = axis.full - axis.offset;
@@ -82,13 +82,14 @@ std::optional<InfoAxis> complete_axis(InfoAxis axis) {
   return axis;
 }
 
-/// REP 104: the region of interest is cut out of the full picture, and its pixels are binned. A pixel's
+/// REP 104: the region of interest is cut out of the full image, and its pixels are binned. A pixel's
 /// middle is at whole numbers here, so that binned pixel 0 of two has its middle at 0.5 of the unbinned ones.
 tl::expected<InfoPinholes, std::string> pinholes_of(const CameraInfoMessage& info, bool by_p) {
   const auto size_ok = [](std::uint32_t size) { return size > 0 && size <= 32768; };
   if (!size_ok(info.width) || !size_ok(info.height))
     return tl::unexpected(fmt::format("says {} x {} pixels", info.width, info.height));
 
+  // Binning and region shrink the stored image
   const RegionMessage& roi = info.roi;
   const auto x = complete_axis({info.width, roi.x_offset, roi.width, info.binning_x});
   const auto y = complete_axis({info.height, roi.y_offset, roi.height, info.binning_y});
@@ -100,10 +101,13 @@ tl::expected<InfoPinholes, std::string> pinholes_of(const CameraInfoMessage& inf
                     info.width, info.height));
   }
 
+  // P belongs to rectified images, K to raw ones
   const double fx = by_p ? info.p[0] : info.k[0];
   const double fy = by_p ? info.p[5] : info.k[4];
   const double cx = by_p ? info.p[2] : info.k[2];
   const double cy = by_p ? info.p[6] : info.k[5];
+
+  // A binned pixel is centred between its originals
   const auto pixels = [](std::uint32_t size) { return static_cast<int>(size); };
   const auto middle = [](double c, const InfoAxis& axis) {
     return axis.binning == 1 ? c - axis.offset : (c - axis.offset + 0.5) / axis.binning - 0.5;
@@ -153,6 +157,8 @@ core::Result<std::optional<InfoCamera>> read_info(const BagSurvey& survey, const
   const auto pinholes = pinholes_of(*message, by_p);
   if (!pinholes) return wrong(pinholes.error());
   InfoCamera camera{pinholes->image, {}, frame_name(message->header.frame_id)};
+
+  // Some drivers announce a region but send full images
   if (pinholes->differ()) {
     const cv::Size full(pinholes->full.width, pinholes->full.height);
     if (image_size(survey, images) == full) {
@@ -163,15 +169,16 @@ core::Result<std::optional<InfoCamera>> read_info(const BagSurvey& survey, const
                       place, full.width, full.height));
     }
   }
-  if (rectified) return camera;
 
+  // Rectified images have no distortion
+  if (rectified) return camera;
   const auto lens = lens_of(*message);
   if (!lens) return wrong(lens.error());
   camera.lens = *lens;
   return camera;
 }
 
-/// Frames and how they sit in their parents.
+/// Frames with their poses in the parent frames.
 class Transforms {
  public:
   void add(const std::vector<TransformMessage>& transforms) {
@@ -207,6 +214,7 @@ class Transforms {
   std::map<std::string, std::pair<std::string, Rigid3>> parents_;
 };
 
+/// The transforms in the first messages of both topics of ROS.
 Transforms read_all_transforms(const BagSurvey& survey) {
   Transforms transforms;
   for (const char* name : {"/tf_static", "/tf"}) {  // ROS 1's publishers of fixed frames use /tf
@@ -221,7 +229,7 @@ Transforms read_all_transforms(const BagSurvey& survey) {
   return transforms;
 }
 
-/// Base name of the topics that RealSense's recorder writes beside an image topic:
+/// Base name of the topics that RealSense's recorder writes for an image topic:
 /// "/device_0/sensor_0/Depth_0" for ".../image/data".
 std::string realsense_stream(const std::string& image) {
   const std::size_t at = image.find(kRealSenseImage);
@@ -246,7 +254,7 @@ double realsense_depth_scale(const BagSurvey& survey, const std::string& stream)
     if (!units || topic.others.empty()) continue;
     const auto metres = survey.first(topic, &MessageDecoder::number);
     if (!metres || !(*metres > 1e-7F && *metres < 1.0F)) continue;
-    // Written as a float: 0.001 is meant by the float next to it.
+    // Rounded, because 0.001 as a float is not exactly 1 / 1000
     return std::round(100.0 / static_cast<double>(*metres)) / 100.0;
   }
   return kMillimetres;
@@ -254,6 +262,7 @@ double realsense_depth_scale(const BagSurvey& survey, const std::string& stream)
 
 std::optional<Rigid3> color_from_depth(const BagSurvey& survey, const ChosenTopics& topics,
                                        const InfoCamera& color, const InfoCamera& depth) {
+  // RealSense's own bags have no /tf_static
   const std::string color_stream = realsense_stream(topics.color.topic->topic.name);
   const std::string depth_stream = realsense_stream(topics.depth.topic->topic.name);
   if (!color_stream.empty() && !depth_stream.empty()) {
@@ -262,6 +271,8 @@ std::optional<Rigid3> color_from_depth(const BagSurvey& survey, const ChosenTopi
     if (color_from_reference && depth_from_reference)
       return *color_from_reference * depth_from_reference->inverse();
   }
+
+  // Images of one frame need no transform
   if (!color.frame.empty() && color.frame == depth.frame) return Rigid3();
   return read_all_transforms(survey).between(color.frame, depth.frame);
 }
@@ -271,7 +282,7 @@ bool same_pixels(const sensor::Pinhole& a, const sensor::Pinhole& b) {
          a.cy == b.cy;
 }
 
-/// Adds a depth camera of its own if depth is not registered to colour.
+/// Adds a depth camera if depth is not registered to colour.
 core::Result<void> add_depth_camera(const BagSurvey& survey, const ChosenTopics& topics,
                                     const InfoCamera& color, const InfoCamera& depth,
                                     sensor::CameraReading& reading) {
@@ -281,6 +292,7 @@ core::Result<void> add_depth_camera(const BagSurvey& survey, const ChosenTopics&
                        depth_name.find("registered") != std::string::npos;
   if (same && (by_name || color.frame == depth.frame)) return {};
 
+  // Depth of another camera needs the transform
   const auto motion = color_from_depth(survey, topics, color, depth);
   if (!motion) {
     return core::usage_error(
@@ -290,6 +302,7 @@ core::Result<void> add_depth_camera(const BagSurvey& survey, const ChosenTopics&
                     survey.path, topics.color.topic->topic.name, color.frame, depth_name, depth.frame));
   }
 
+  // Equal cameras in one place are registered
   const bool nothing_moves = motion->rotation.isIdentity(kNothing) && motion->translation.isZero(kNothing);
   if (same && nothing_moves) return {};
   reading.camera.color_from_depth = *motion;
@@ -309,6 +322,7 @@ core::Result<std::optional<sensor::CameraReading>> bag_camera(const BagSurvey& s
   if (!color) return tl::unexpected(color.error());
   if (!*color) return std::nullopt;
 
+  // Intrinsics and distortion of the colour camera
   sensor::CameraReading reading;
   reading.program = "ROS";
   reading.camera.name = topics.info.topic->topic.name;
@@ -317,9 +331,11 @@ core::Result<std::optional<sensor::CameraReading>> bag_camera(const BagSurvey& s
   reading.camera.distortion = (*color)->lens.k;
   reading.camera.depth_scale = kMillimetres;
 
+  // RealSense's own bags name the depth unit
   const std::string stream = realsense_stream(topics.depth.topic->topic.name);
   if (!stream.empty()) reading.camera.depth_scale = realsense_depth_scale(survey, stream);
 
+  // Depth may come from a second camera
   const auto depth = read_info(survey, topics.depth_info, *topics.depth.topic, log);
   if (!depth) return tl::unexpected(depth.error());
   if (*depth) {
@@ -327,6 +343,7 @@ core::Result<std::optional<sensor::CameraReading>> bag_camera(const BagSurvey& s
       return tl::unexpected(added.error());
   }
 
+  // An uncalibrated camera is reported, not used
   if (const std::string wrong = sensor::camera_problem(reading.camera); !wrong.empty()) {
     return core::input_error(fmt::format("{}: {}: {}; name a camera file with --camera", survey.path,
                                          topics.info.topic->topic.name, wrong));

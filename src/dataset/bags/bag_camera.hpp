@@ -11,14 +11,14 @@
 namespace plumbline::dataset {
 
 /// None when there is no CameraInfo of colour, or one of a camera that was never calibrated; a warning says
-/// which. Regions of interest and binning are applied (REP 104). Where depth has a camera of its own,
+/// which. Regions of interest and binning are applied (REP 104). Where depth has another camera,
 /// color_from_depth comes from /tf_static, /tf, or RealSense's own transforms. Errors (kUsage): colour and
 /// depth are of different cameras and nothing says how they sit: both are named, and the option; (kInput):
 /// numbers that make no camera.
 core::Result<std::optional<sensor::CameraReading>> bag_camera(const BagSurvey& survey,
                                                               const ChosenTopics& topics, core::Log& log);
 
-/// Pose of the camera in a frame of the robot by the transforms of the bag; none: they do not tell it.
+/// Pose of the camera in a frame of the robot by the transforms of the bag; none if they do not contain it.
 std::optional<geometry::Rigid3> body_from_camera(const BagSurvey& survey, const ChosenTopics& topics,
                                                  const std::string& body);
 

@@ -60,7 +60,7 @@ class BagFile {
   [[nodiscard]] virtual const std::vector<BagTopic>& topics() const = 0;
   /// Remarks for the user, such as damaged parts; one sentence each.
   [[nodiscard]] virtual const std::vector<std::string>& notes() const = 0;
-  /// The camera.yaml that `plumbline convert` puts beside the messages; "" if there is none.
+  /// The camera.yaml that `plumbline convert` stores with the messages; "" if there is none.
   [[nodiscard]] virtual std::string camera_yaml() const { return ""; }
 };
 

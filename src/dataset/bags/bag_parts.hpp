@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Reading and writing bags, as a part of its own (core/part.hpp): CycloneDDS (which brings OpenSSL along),
+// Reading and writing bags, as a separate part (core/part.hpp): CycloneDDS (which brings OpenSSL along),
 // SQLite and the compression libraries are loaded only when a bag is opened.
 #include "bags/bag_writer.hpp"
 #include "bags/messages.hpp"

@@ -78,6 +78,7 @@ TopicImages images_in(const BagSurvey& survey, const SurveyedTopic& topic, core:
   list.decoder = topic.decoder;
   list.images = topic.images;
 
+  // Without stamps the times of recording count
   const bool stamped = std::any_of(list.images.begin(), list.images.end(),
                                    [](const ImageEntry& entry) { return entry.stamp_ns != 0; });
   if (!stamped) {
@@ -86,9 +87,12 @@ TopicImages images_in(const BagSurvey& survey, const SurveyedTopic& topic, core:
     for (ImageEntry& entry : list.images) entry.stamp_ns = entry.log_ns;
   }
 
+  // Damaged images are not paired
   if (const std::size_t dropped = drop_damaged(survey, list.images); dropped > 0)
     log.warning(
         fmt::format("{}: {} images of {} are damaged and left out", survey.path, dropped, topic.topic.name));
+
+  // Bags are ordered by arrival, not by stamp
   std::stable_sort(list.images.begin(), list.images.end(),
                    [](const ImageEntry& a, const ImageEntry& b) { return a.stamp_ns < b.stamp_ns; });
   return list;
@@ -103,6 +107,7 @@ std::vector<StampedFile> stamps_of(const TopicImages& list) {
 
 core::Result<std::optional<sensor::CameraReading>> camera_of_bag(const BagSurvey& survey,
                                                                  const ChosenTopics& topics, core::Log& log) {
+  // Plumbline's own bags hold the camera file
   if (survey.camera_yaml.empty()) return bag_camera(survey, topics, log);
   auto camera = sensor::parse_camera(survey.camera_yaml, survey.path);
   if (!camera) return tl::unexpected(camera.error());
@@ -113,6 +118,7 @@ core::Result<std::optional<sensor::CameraReading>> camera_of_bag(const BagSurvey
 
 }  // namespace
 
+/// Pairs a second by the median step; 30 if no step is known.
 double usual_fps(const std::vector<PairInfo>& pairs) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < pairs.size(); ++i) {
@@ -133,20 +139,25 @@ core::Result<Layout> read_bag(const std::filesystem::path& path, const TopicName
   log.info(fmt::format("{}: colour from {}, depth from {}", survey->path, topics->color.topic->topic.name,
                        topics->depth.topic->topic.name));
 
+  // Pairing needs the camera's delay of depth
   auto camera = camera_of_bag(*survey, *topics, log);
   if (!camera) return tl::unexpected(camera.error());
   Layout layout;
   layout.format = survey->kind;
   layout.camera = std::move(*camera);
 
+  // Both topics, in the order of stamps
   TopicImages color = images_in(*survey, *topics->color.topic, log);
   TopicImages depth = images_in(*survey, *topics->depth.topic, log);
   const auto color_stamps = stamps_of(color);
   const auto depth_stamps = stamps_of(depth);
+
+  // The option replaces the camera's delay
   const double own_delay_s = layout.camera ? layout.camera->camera.depth_delay_s : 0.0;
   const double delay_s = options.depth_delay_s != 0.0 ? options.depth_delay_s : own_delay_s;
   layout.pairs = pair_by_stamp(color_stamps, depth_stamps, options.max_pair_gap_s, delay_s);
 
+  // The two topics may not overlap in time
   if (layout.pairs.empty()) {
     if (color_stamps.empty() || depth_stamps.empty())
       return core::input_error(survey->path + ": no image of colour or depth can be read");
@@ -155,6 +166,7 @@ core::Result<Layout> read_bag(const std::filesystem::path& path, const TopicName
                                             options.max_pair_gap_s));
   }
 
+  // ROS's calibration does not tell the rate
   if (layout.camera && survey->camera_yaml.empty()) layout.camera->camera.fps = usual_fps(layout.pairs);
   if (options.body) layout.body = read_bag_body(*survey, *topics, log);
   layout.images = std::make_shared<BagImages>(*survey, std::move(color), std::move(depth));

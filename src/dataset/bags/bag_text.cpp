@@ -9,6 +9,7 @@ namespace {
 
 double seconds(std::int64_t nanoseconds) { return static_cast<double>(nanoseconds) * 1e-9; }
 
+/// Rate and time span are left out if they are unknown.
 std::string topic_line(const SurveyedTopic& topic) {
   std::string line = fmt::format("topic: {} {}, {} messages", topic.topic.name,
                                  topic.topic.type.empty() ? "of no type" : topic.topic.type, topic.count);
@@ -40,6 +41,8 @@ core::Result<std::string> bag_to_text(const std::filesystem::path& path, const T
                   survey->files.size() > 1 ? fmt::format(", {} files", survey->files.size()) : "");
   for (const SurveyedTopic& topic : survey->topics) text += topic_line(topic);
   for (const std::string& note : survey->notes) text += "damaged: " + note + "\n";
+
+  // Without a choice the topics are still listed
   const auto chosen = choose_topics(*survey, named);
   if (!chosen) return text;  // opening it reports the reason
   return text + choice_text(*chosen);

@@ -23,7 +23,7 @@ class BagWriter {
   /// Writes a message of one of these types unchanged; `type`: "sensor_msgs/msg/Image".
   virtual void write_bytes(const std::string& topic, const std::string& type, std::int64_t log_ns,
                            const Bytes& cdr) = 0;
-  /// Stores the camera file beside the messages, for what these cannot express.
+  /// Stores the camera file with the messages, for what these cannot express.
   virtual void write_camera_yaml(const std::string& text) = 0;
   virtual core::Result<void> finish() = 0;
 };

@@ -40,11 +40,15 @@ bool tells_of_body(const BagTopic& topic) {
 
 void BodyMessages::add_imu(const std::string& topic, const ImuMessage& message) {
   const ImuReading reading{seconds_of(message.header.stamp_ns), message.turn_rate, message.acceleration};
+
+  // The first topic with turn rates is the IMU
   if (imu_topic_.empty() && !reading.turn_rate.isZero(0.0)) imu_topic_ = topic;
   if (topic == imu_topic_)
     append(imu_, reading);
   else if (reading.turn_rate.isZero(0.0) && !reading.acceleration.isZero(0.0))
     append(accelerations_, reading);
+
+  // Accelerations may come from a second topic
   if (!imu_.empty() && !accelerations_.empty() && imu_.back().acceleration.isZero(0.0))
     imu_.back().acceleration = accelerations_.back().acceleration;
 }
@@ -56,6 +60,7 @@ void BodyMessages::add(const BagTopic& topic, const MessageDecoder& decoder, con
     return;
   }
 
+  // The first topic of odometry counts
   if (topic.type == "nav_msgs/Odometry") {
     const auto message = decoder.odometry(bytes);
     if (!message || message->stamp_ns == 0) return;
@@ -66,6 +71,7 @@ void BodyMessages::add(const BagTopic& topic, const MessageDecoder& decoder, con
     return;
   }
 
+  // Transforms from an odometry frame are odometry, too
   const auto message = decoder.transforms(bytes);
   if (!message) return;
   for (const TransformMessage& t : *message) {
@@ -85,7 +91,7 @@ void BodyMessages::join_accelerations() {
 
 std::shared_ptr<const BodyReadings> read_bag_body(const BagSurvey& survey, const ChosenTopics& topics,
                                                   core::Log& log) {
-  // The liveliest topic first.
+  // The topic with the most messages comes first
   std::vector<const SurveyedTopic*> told;
   for (const SurveyedTopic& topic : survey.topics) {
     if (tells_of_body(topic.topic) && topic.decoder != nullptr) told.push_back(&topic);

@@ -15,8 +15,8 @@ namespace plumbline::dataset {
 /// True for sensor_msgs/Imu, nav_msgs/Odometry, and /tf, in which a robot may publish odom -> base.
 bool tells_of_body(const BagTopic& topic);
 
-/// Takes messages topic by topic (a bag) or as they come (live). Of several topics of a kind the first that
-/// says something is taken; nav_msgs/Odometry before /tf.
+/// Takes messages topic by topic (a bag) or as they come (live). The first topic of each
+/// kind that measures something is used; nav_msgs/Odometry before /tf.
 class BodyMessages {
  public:
   /// Messages that cannot be decoded, have no stamp or go back are left out.

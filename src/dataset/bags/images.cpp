@@ -61,6 +61,7 @@ std::string not_known(const std::string& encoding) {
   return fmt::format("has the encoding '{}', which is not known (known: {})", encoding, known);
 }
 
+/// Reverses the bytes of each value.
 void swap_bytes(cv::Mat& image) {
   const std::size_t width = image.elemSize1();
   for (int v = 0; v < image.rows; ++v) {
@@ -143,6 +144,7 @@ MessageImage compressed_depth(const CompressedImageMessage& message) {
   MessageImage image = rvl ? rvl_image(data, size) : decode_file(Bytes(data, data + size));
   if (!image || message.format.rfind("32FC1", 0) != 0) return image;
 
+  // Floats are stored as quantised inverse depth
   const auto inverse = inverse_depth(message.data, begin);
   if (!inverse) {
     return tl::unexpected<std::string>(
@@ -166,6 +168,7 @@ MessageImage image_of(const ImageMessage& message) {
   const RawEncoding* encoding = encoding_of(message.encoding);
   if (encoding == nullptr) return tl::unexpected(not_known(message.encoding));
 
+  // The promised size must fit into the message
   const std::uint64_t width_bytes = std::uint64_t{message.width} * CV_ELEM_SIZE(encoding->type);
   const std::uint64_t step = message.step == 0 ? width_bytes : message.step;
   const std::uint64_t pixels = std::uint64_t{message.width} * message.height;
@@ -176,12 +179,14 @@ MessageImage image_of(const ImageMessage& message) {
                     message.height, message.encoding, message.step, message.data.size()));
   }
 
+  // Rows may end with padding
   cv::Mat image(static_cast<int>(message.height), static_cast<int>(message.width), encoding->type);
   for (int v = 0; v < image.rows; ++v)
     std::memcpy(image.ptr(v), message.data.data() + static_cast<std::size_t>(v) * step, width_bytes);
   if (message.big_endian && image.elemSize1() > 1) swap_bytes(image);
   if (encoding->conversion == kAsItIs) return image;
 
+  // YUV 4:2:2 needs an even width
   const bool pairs = encoding->type == CV_8UC2;  // of pixels, which share their colour
   if (pairs && image.cols % 2 != 0)
     return tl::unexpected<std::string>(

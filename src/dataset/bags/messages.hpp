@@ -37,7 +37,7 @@ struct CompressedImageMessage {
   Bytes data;
 };
 
-/// sensor_msgs/RegionOfInterest, in pixels of the camera's full picture; all 0: the full picture
+/// sensor_msgs/RegionOfInterest, in pixels of the camera's full image; all 0: the full image
 struct RegionMessage {
   std::uint32_t x_offset = 0;
   std::uint32_t y_offset = 0;
@@ -46,7 +46,7 @@ struct RegionMessage {
   bool do_rectify = false;
 };
 
-/// sensor_msgs/CameraInfo: size, k and p are of the camera's full picture. An image of the topic beside it is
+/// sensor_msgs/CameraInfo: size, k and p are of the camera's full image. The accompanying image is
 /// the region of interest, of which binning_x times binning_y pixels became one.
 struct CameraInfoMessage {
   MessageHeader header;

@@ -20,6 +20,7 @@ MessageBytes encoded(const Encode& encode) {
   return encode((*part)->encoder());
 }
 
+/// A grid of the map at that time, in seconds.
 GridMessage message_of(const std::string& frame, double stamp, GridCells cells) {
   return {{stamp_ns_of(stamp), frame},
           cells.resolution_m,
@@ -48,6 +49,7 @@ core::Result<std::vector<std::pair<double, NamedTransform>>> read_transforms(
   auto messages = (*part)->cdr().transforms(bytes);
   if (!messages) return core::input_error("tf2_msgs/TFMessage " + messages.error());
 
+  // Stamps in seconds, as in the rest of the program
   std::vector<std::pair<double, NamedTransform>> transforms;
   for (TransformMessage& m : *messages) {
     transforms.push_back({1e-9 * static_cast<double>(m.stamp_ns),

@@ -113,6 +113,7 @@ class Surveyor {
 
  private:
   SurveyedTopic& topic_of(const BagFile& bag, std::size_t number) {
+    // Files of one bag share their topics
     while (topics_of_file_.size() <= number) {
       const BagTopic& topic = bag.topics().at(topics_of_file_.size());
       const auto same = [&topic](const SurveyedTopic& other) {
@@ -135,12 +136,18 @@ class Surveyor {
     topic.first_ns = topic.count == 0 ? entry.log_ns : std::min(topic.first_ns, entry.log_ns);
     topic.last_ns = topic.count == 0 ? entry.log_ns : std::max(topic.last_ns, entry.log_ns);
     ++topic.count;
+
+    // A bag may consist of several files
     MessagePlace place = entry.place;
     place.file = file;
+
+    // Images are listed by their own stamps
     if (!topic.has_images()) {
       if (topic.others.size() < kFewMessages || tells_of_body(topic.topic)) topic.others.push_back(place);
     } else if (topic.decoder != nullptr) {
       const auto stamp = topic.decoder->stamp(entry.head, entry.head_size);
+
+      // Images without a stamp cannot be paired
       if (stamp) {
         topic.images.push_back({*stamp, entry.log_ns, place});
       } else {

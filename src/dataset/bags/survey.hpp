@@ -56,6 +56,7 @@ struct BagSurvey {
       return core::input_error(path + ": " + topic.topic.name + ": has no message");
     return read(topic, places.empty() ? topic.images.front().place : places.front(), decode);
   }
+  /// A decoded message; the error names its topic.
   template <typename Message>
   core::Result<Message> read(const SurveyedTopic& topic, const MessagePlace& place,
                              DecodedMessage<Message> (*MessageDecoder::*decode)(const Bytes&)) const {

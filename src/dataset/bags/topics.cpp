@@ -77,6 +77,7 @@ std::string encoding_of_topic(const BagSurvey& survey, const SurveyedTopic& topi
   return "";
 }
 
+/// All topics with images of a known encoding.
 std::vector<Candidate> image_topics(const BagSurvey& survey) {
   std::vector<Candidate> candidates;
   for (const SurveyedTopic& topic : survey.topics) {
@@ -119,6 +120,8 @@ std::vector<Candidate> those(const std::vector<Candidate>& of,
 
 core::Result<ChosenTopic> named_image(const BagSurvey& survey, const std::string& name, const char* option) {
   const SurveyedTopic* topic = survey.find(name);
+
+  // The error lists the existing topics
   if (topic == nullptr) {
     std::string list;
     for (const SurveyedTopic& each : survey.topics) list += (list.empty() ? "" : ", ") + each.topic.name;
@@ -158,6 +161,8 @@ core::Result<ChosenTopic> choose_depth(const BagSurvey& survey, const std::vecto
   if (depths.empty()) return core::input_error(none_of(survey, "depth"));
   if (depths.size() == 1)
     return ChosenTopic{depths.front().topic, "the only depth image", depths.front().encoding};
+
+  // Cameras may publish raw and aligned depth
   const auto aligned = those(depths, [](const Candidate& c) { return named_aligned(c.topic->topic.name); });
   if (aligned.size() == 1) {
     return ChosenTopic{aligned.front().topic, "the only depth image that is aligned to colour by its name",
@@ -177,7 +182,7 @@ core::Result<ChosenTopic> choose_color(const BagSurvey& survey, const std::vecto
   if (colors.size() == 1)
     return ChosenTopic{colors.front().topic, "the only colour image", colors.front().encoding};
 
-  // Colours before grey, the camera that depth is of before others, without distortion before with it.
+  // Colour before grey, depth's own camera before others, undistorted before distorted images
   const auto rank = [&depth](const Candidate& c) {
     const std::string& name = c.topic->topic.name;
     const bool colored = !contains(c.encoding, "mono") && c.encoding != "8UC1";
@@ -198,15 +203,17 @@ core::Result<ChosenTopic> choose_color(const BagSurvey& survey, const std::vecto
                                        colors.front().topic->topic.name));
 }
 
-/// The CameraInfo of an image: the one beside it, or the one with the most similar name.
+/// The CameraInfo of an image: the one in its namespace, or the one with the most similar name.
 core::Result<ChosenTopic> choose_info(const BagSurvey& survey, const std::string& image,
                                       const std::string& named, const char* option) {
+  // CameraInfo that can be decoded
   std::vector<const SurveyedTopic*> infos;
   for (const SurveyedTopic& topic : survey.topics) {
     if (topic.is("sensor_msgs/CameraInfo") && topic.count > 0 && topic.decoder != nullptr)
       infos.push_back(&topic);
   }
 
+  // The user's choice comes first
   if (!named.empty()) {
     for (const SurveyedTopic* topic : infos) {
       if (topic->topic.name == named) return ChosenTopic{topic, "named by --topic", ""};
@@ -216,6 +223,7 @@ core::Result<ChosenTopic> choose_info(const BagSurvey& survey, const std::string
   }
   if (infos.empty()) return ChosenTopic{};
 
+  // ROS's convention: camera_info in the image's namespace
   const std::string beside = parent_of(image_name(image)) + "/camera_info";
   for (const SurveyedTopic* topic : infos) {
     if (topic->topic.name == beside) return ChosenTopic{topic, "beside the image", ""};
@@ -223,6 +231,7 @@ core::Result<ChosenTopic> choose_info(const BagSurvey& survey, const std::string
 
   if (infos.size() == 1) return ChosenTopic{infos.front(), "the only CameraInfo", ""};
 
+  // The most similar name, if it is unique
   std::stable_sort(infos.begin(), infos.end(), [&image](const SurveyedTopic* a, const SurveyedTopic* b) {
     return common_parts(a->topic.name, image) > common_parts(b->topic.name, image);
   });
@@ -236,6 +245,8 @@ core::Result<ChosenTopic> choose_info(const BagSurvey& survey, const std::string
 core::Result<ChosenTopics> choose_topics(const BagSurvey& survey, const TopicNames& named) {
   const std::vector<Candidate> images = image_topics(survey);
   ChosenTopics chosen;
+
+  // The depth topic decides which colour fits
   auto depth = named.depth.empty() ? choose_depth(survey, images) : named_image(survey, named.depth, "depth");
   if (!depth) return tl::unexpected(depth.error());
   chosen.depth = *depth;
@@ -244,6 +255,7 @@ core::Result<ChosenTopics> choose_topics(const BagSurvey& survey, const TopicNam
   if (!color) return tl::unexpected(color.error());
   chosen.color = *color;
 
+  // Calibrations belong to the chosen images
   auto info = choose_info(survey, chosen.color.topic->topic.name, named.info, "info");
   if (!info) return tl::unexpected(info.error());
   chosen.info = *info;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Which topics of a bag are the colour, the depth and their cameras, and why.
+// The choice of a bag's topics for colour, depth and their cameras, with the reasons.
 #include <optional>
 #include <string>
 

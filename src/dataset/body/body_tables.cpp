@@ -100,12 +100,16 @@ core::Result<std::vector<std::vector<double>>> read_table(const fs::path& file,
                          : place < static_cast<int>(words.size())
                              ? core::to_number(words[static_cast<std::size_t>(place)])
                              : std::nullopt;
+
+      // Columns may be missing, but not single numbers
       if (!value) {
         return core::input_error(
             fmt::format("{}:{}: column {} is not a number", file.string(), line.number, place + 1));
       }
       row.push_back(*value);
     }
+
+    // The size of a stamp tells its unit
     row[0] *= nanoseconds || row[0] > 1e17 ? 1e-9 : row[0] > 1e14 ? 1e-6 : row[0] > 1e11 ? 1e-3 : 1.0;
     rows.push_back(std::move(row));
   }
@@ -121,6 +125,7 @@ std::vector<Reading> in_order(std::vector<Reading> readings) {
   return readings;
 }
 
+/// Rows without a stamp or a turn rate are left out.
 core::Result<std::vector<ImuReading>> read_imu_table(const fs::path& file) {
   const auto rows = read_table(file, imu_columns());
   if (!rows) return tl::unexpected(rows.error());
@@ -137,12 +142,17 @@ core::Result<std::vector<OdometryReading>> read_odometry_table(const fs::path& f
   if (!rows) return tl::unexpected(rows.error());
   std::vector<OdometryReading> readings;
   for (const std::vector<double>& r : *rows) {
+    // The rotation is a quaternion or a yaw angle
     const bool full = std::isfinite(r[5] + r[6] + r[7] + r[8]);
     const Eigen::Quaterniond turn = full ? Eigen::Quaterniond(r[8], r[5], r[6], r[7])
                                          : Eigen::Quaterniond(Eigen::AngleAxisd(r[4], Vector3d::UnitZ()));
+
+    // Planar odometry has neither height nor tilt
     OdometryReading reading;
     reading.stamp = r[0];
     reading.odom_from_body = {turn, Vector3d(r[1], r[2], std::isfinite(r[3]) ? r[3] : 0.0)};
+
+    // Rows that are not finite are left out
     const bool finite =
         reading.odom_from_body.translation.allFinite() && reading.odom_from_body.rotation.allFinite();
     if (finite && std::isfinite(reading.stamp)) readings.push_back(reading);
@@ -177,6 +187,8 @@ BodyReadings readings_between(const std::vector<ImuReading>& imu,
 std::shared_ptr<const BodyReadings> read_body_tables(const fs::path& folder, bool with_odometry,
                                                      core::Log& log) {
   auto body = std::make_shared<BodyReadings>();
+
+  // The first table with readings counts
   for (const char* name : {"imu.csv", "imu0/data.csv"}) {
     if (body->imu.empty() && is_file(folder / name))
       take_table(read_imu_table(folder / name), body->imu, log);

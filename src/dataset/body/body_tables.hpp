@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Tables of an inertial sensor and of wheels beside a recording's images.
+// Tables of an inertial sensor and of wheels in a recording's folder.
 #include <filesystem>
 #include <memory>
 

@@ -51,7 +51,7 @@ bool is_unfinished_list(const fs::path& file) {
   return file.filename().string().rfind(".associations.txt.", 0) == 0;
 }
 
-/// True for "1305031102.175304000.png", and for what is first written for it.
+/// True for "1305031102.175304000.png" and for its temporary file.
 bool is_image_of_a_copy(const std::string& name) {
   constexpr std::size_t kDecimals = 9;
   const std::size_t begin = name.find_first_not_of(".-");
@@ -71,7 +71,7 @@ bool only_parts_of_a_copy(const fs::path& folder) {
          });
 }
 
-/// True if convert_recording() wrote what is there: no other recording may be replaced.
+/// True if convert_recording() wrote the existing copy: no other recording may be replaced.
 bool is_copy(const fs::path& there, bool file) {
   std::error_code ec;
   if (file) {
@@ -104,12 +104,15 @@ core::Result<void> clear_leftover(const fs::path& partial, bool replace) {
   std::error_code ec;
   if (!fs::exists(partial, ec)) return {};
   const bool complete = is_copy(partial, false);
+
+  // A complete copy is dropped only with --force
   if (complete && !replace) {
     return core::usage_error(fmt::format(
         "{}: holds a complete copy that was not moved to its place; rename it, or --force drops it",
         partial.string()));
   }
 
+  // Folders that are not leftovers stay untouched
   const bool unfinished =
       std::any_of(fs::directory_iterator(partial, ec), fs::directory_iterator(),
                   [](const fs::directory_entry& entry) { return is_unfinished_list(entry.path()); });
@@ -130,8 +133,8 @@ core::Result<void> check_place(const fs::path& out, const fs::path& partial, boo
   return file ? core::check_writable(out) : clear_leftover(partial, replace);
 }
 
-/// Asks again whether `out` may be written: it may have come while the copy was made. `written`: where the
-/// copy is, "" if it is not written yet.
+/// Checks again that `out` may be written: it may have appeared while the copy was made. `written`: the place
+/// of the copy, "" if it is not written yet.
 core::Result<void> make_room_again(const fs::path& out, bool file, bool replace, const fs::path& written) {
   const auto room = make_room(out, file, replace);
   if (room) return {};
@@ -140,7 +143,7 @@ core::Result<void> make_room_again(const fs::path& out, bool file, bool replace,
   return core::output_error(fmt::format("{}; {}", room.error().message, where));
 }
 
-/// Moves a folder, which was written beside its destination, to it.
+/// Moves a folder, which was written next to its destination, there.
 core::Result<void> put_in_place(const fs::path& written, const fs::path& out, bool replace) {
   if (auto room = make_room_again(out, false, replace, written); !room) return room;
   std::error_code problem;
@@ -154,7 +157,7 @@ core::Result<void> put_in_place(const fs::path& written, const fs::path& out, bo
                                         out.string(), problem.message(), written.string()));
 }
 
-/// Refuses images that a link brings into the recording's folder: what lies elsewhere is not the recording's.
+/// Refuses images that a link brings into the recording's folder: others are not the recording's.
 core::Result<void> check_links(const StoredPair& pair) {
   for (const StoredImage* image : {&pair.color, &pair.depth}) {
     if (!image->linked_out) continue;
@@ -177,6 +180,7 @@ core::Result<ConvertSummary> copy_frames(const FrameSource& source, CopyTarget& 
       break;
     }
 
+    // Stamps as measured, without the delay of depth
     const PairInfo info = source.info(i);
     const auto pair = source.stored(i);
     core::Result<void> added;
@@ -186,6 +190,7 @@ core::Result<ConvertSummary> copy_frames(const FrameSource& source, CopyTarget& 
                          nanoseconds(info.depth_stamp - source.camera().depth_delay_s), *pair);
     }
 
+    // Unreadable frames are skipped; a full disk ends the copy
     const core::Error* problem = !pair ? &pair.error() : !added ? &added.error() : nullptr;
     if (problem != nullptr && problem->kind != core::ErrorKind::kInput) return tl::unexpected(*problem);
     if (problem == nullptr) {
@@ -194,9 +199,12 @@ core::Result<ConvertSummary> copy_frames(const FrameSource& source, CopyTarget& 
       if (first_error.empty()) first_error = problem->message;
       log.warning(fmt::format("frame {} is left out: {}", i, problem->message));
     }
+
+    // Unreadable frames count as progress, too
     if (options.progress) options.progress(i + 1);
   }
 
+  // A copy needs at least one frame
   if (summary.written > 0) return summary;
   return core::input_error(
       fmt::format("{}: no frame can be copied; the first: {}", source.name(), first_error));
@@ -213,6 +221,8 @@ std::int64_t nanoseconds(double seconds) {
 core::Result<ConvertSummary> convert_recording(const FrameSource& source, const fs::path& out,
                                                const ConvertOptions& options, core::Log& log) {
   const bool file = out.extension() == ".mcap";
+
+  // The copy is moved to its place when complete
   fs::path folder = out.has_filename() ? out : out.parent_path();  // where it is first written
   folder += ".partial";
   if (auto free = check_place(out, folder, file, options.replace); !free) return tl::unexpected(free.error());
@@ -222,6 +232,8 @@ core::Result<ConvertSummary> convert_recording(const FrameSource& source, const 
 
   auto summary = copy_frames(source, **target, options, log);
   core::Result<void> done;
+
+  // The recorder's poses are not ground truth
   const bool odometry = source.truth_is_odometry();
   if (odometry)
     log.warning("the poses that the recorder kept are not in the copy: it is tracked without them");
@@ -230,6 +242,7 @@ core::Result<ConvertSummary> convert_recording(const FrameSource& source, const 
   if (summary && file) done = make_room_again(out, true, options.replace, "");
   if (summary && done) done = (*target)->finish(odometry ? std::nullopt : source.truth());
 
+  // A failed copy leaves nothing
   if (!summary || !done) {
     target->reset();
     const auto removed = file ? core::Result<void>() : core::remove_own_files(folder, kPartsOfACopy);
@@ -237,6 +250,7 @@ core::Result<ConvertSummary> convert_recording(const FrameSource& source, const 
     return tl::unexpected(summary ? done.error() : summary.error());
   }
 
+  // A folder appears complete
   if (!file) done = put_in_place(folder, out, options.replace);
   if (!done) return tl::unexpected(done.error());
   return summary;

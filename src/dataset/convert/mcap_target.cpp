@@ -69,6 +69,7 @@ Bytes imu_message(const ImuReading& reading) {
   return cdr.bytes();
 }
 
+/// nav_msgs/Odometry in CDR, with covariances of zero.
 Bytes odometry_message(const OdometryReading& reading) {
   CdrText cdr(reading.stamp, "odom");
   cdr.text(kBodyFrame);
@@ -100,6 +101,7 @@ std::string encoding_of_pixels(const cv::Mat& image) {
   }
 }
 
+/// Row by row: OpenCV's images may have gaps between rows.
 ImageMessage message_of(const cv::Mat& image, const MessageHeader& header, const std::string& encoding) {
   ImageMessage message;
   message.header = header;
@@ -120,6 +122,8 @@ CameraInfoMessage info_of(const sensor::Pinhole& camera, const sensor::Lens& len
   info.header = header;
   info.width = static_cast<std::uint32_t>(camera.width);
   info.height = static_cast<std::uint32_t>(camera.height);
+
+  // The shortest model that holds all coefficients
   const bool fisheye = lens.model == sensor::LensModel::kEquidistant;
   const bool rational = !fisheye && (lens.k[5] != 0.0 || lens.k[6] != 0.0 || lens.k[7] != 0.0);
   info.distortion_model = fisheye ? "equidistant" : rational ? "rational_polynomial" : "plumb_bob";
@@ -138,6 +142,7 @@ class McapTarget final : public CopyTarget {
         standard_depth_(standard_depth),
         body_(body),
         log_(log) {
+    // Depth that is not registered has another topic
     own_depth_camera_ = camera_.color_from_depth && camera_.depth;
     depth_topic_ = own_depth_camera_ ? "/camera/depth" : "/camera/aligned_depth_to_color";
   }
@@ -149,9 +154,12 @@ class McapTarget final : public CopyTarget {
     const MessageHeader header{color_ns, kColorFrame};
     const auto size = write_color(header, pair.color);
     if (!size) return tl::unexpected(size.error());
+
+    // CameraInfo describes the stored size
     const sensor::Pinhole stored = camera_.color.resized(size->width, size->height);
     bag_->write(std::string(kColorTopic) + "/camera_info", info_of(stored, camera_.lens(), header));
 
+    // Depth has the frame of its camera
     const MessageHeader depth_header{depth_ns, own_depth_camera_ ? kDepthFrame : kColorFrame};
     bag_->write(depth_topic_ + (own_depth_camera_ ? "/image_rect_raw" : "/image_raw"),
                 depth_message(pair.depth.pixels, depth_header));
@@ -169,6 +177,7 @@ class McapTarget final : public CopyTarget {
 
  private:
   void begin(std::int64_t stamp_ns) {
+    // Fixed transforms come before the first image
     begun_ = true;
     std::vector<TransformMessage> fixed;
     if (own_depth_camera_) fixed.push_back({kColorFrame, kDepthFrame, *camera_.color_from_depth});
@@ -212,13 +221,17 @@ class McapTarget final : public CopyTarget {
 
   /// Millimetres unchanged; other units as metres, which are converted back without loss.
   ImageMessage depth_message(const cv::Mat& stored, const MessageHeader& header) {
+    // ROS's depth is 16 bits or 32-bit floats
     cv::Mat depth = stored;
     if (depth.type() == CV_16UC3) cv::extractChannel(depth, depth, 0);
     if (depth.type() == CV_64FC1) depth.convertTo(depth, CV_32F);
     const bool others = standard_depth_ && camera_.depth_scale != kMillimetresOfMetre;
 
+    // Units that other programs take for millimetres
     if (depth.type() == CV_16UC1 && (camera_.depth_scale == kFloatDepthScale || others)) {
       cv::Mat metres(depth.size(), CV_32FC1);
+
+      // 65535 marks pixels without measurement
       for (int v = 0; v < depth.rows; ++v) {
         const auto* from = depth.ptr<std::uint16_t>(v);
         auto* to = metres.ptr<float>(v);
@@ -229,6 +242,7 @@ class McapTarget final : public CopyTarget {
       depth = metres;
     }
 
+    // One warning, not one for each frame
     const bool odd = depth.type() == CV_16UC1 && camera_.depth_scale != kMillimetresOfMetre;
     if (odd && !told_scale_) {
       log_.warning(

@@ -63,6 +63,7 @@ class SinkWriter final : public BagWriter {
     keep(sink_.send(topic, encode()));
   }
   bool announce(const std::string& topic, const std::string& type, Retention retention) {
+    // Subscribers of images start the replay
     const bool image = type.find("Image") != std::string::npos;
     if (image && std::find(images_.begin(), images_.end(), topic) == images_.end()) images_.push_back(topic);
     auto announced = sink_.announce(topic, type, retention);
@@ -89,6 +90,8 @@ class Player {
     auto writer = std::make_unique<SinkWriter>(sink, encoder);
     writer_ = writer.get();
     target_ = make_message_target(std::move(writer), source.camera(), true, nullptr, log);
+
+    // Repetitions follow after the usual step
     std::vector<PairInfo> infos;
     for (std::size_t i = 0; i < source.size(); ++i) infos.push_back(source.info(i));
     step_s_ = 1.0 / usual_fps(infos);
@@ -101,6 +104,7 @@ class Player {
     const double first = source_.info(0).stamp;
     const double last = source_.info(source_.size() - 1).stamp;
 
+    // Stamps of each round continue the last
     for (std::size_t round = 0; !options_.stop.stop_requested() && (round == 0 || options_.loop); ++round) {
       offset_s_ = static_cast<double>(round) * (last - first + step_s_);
       if (auto played = play_once(first); !played) return tl::unexpected(played.error());
@@ -125,6 +129,7 @@ class Player {
   }
 
   void wait_for_listener() {
+    // A late subscriber would miss the first frames
     const auto until = Clock::now() + std::chrono::duration_cast<Clock::duration>(Seconds(options_.wait_s));
     if (!writer_->heard()) log_.info("waiting for a subscriber");
     while (!writer_->heard() && Clock::now() < until && !options_.stop.stop_requested())
@@ -164,9 +169,12 @@ class Player {
   }
 
   void wait_until_due(double since_first_s) {
+    // A fixed pace replaces the recorded stamps
     const double due_s =
         options_.pace_hz > 0.0 ? static_cast<double>(frames_) / options_.pace_hz : since_first_s + offset_s_;
     const auto due = start_ + std::chrono::duration_cast<Clock::duration>(Seconds(due_s));
+
+    // Short sleeps, so that a stop takes effect
     while (Clock::now() < due && !options_.stop.stop_requested())
       std::this_thread::sleep_until(std::min(due, Clock::now() + kLookForListeners));
     summary_.late_s = std::max(summary_.late_s, Seconds(Clock::now() - due).count());

@@ -45,11 +45,13 @@ class TumTarget final : public CopyTarget {
     if (truth) {
       if (auto written = write_trajectory(folder_ / "groundtruth.txt", *truth); !written) return written;
     }
+
+    // The list of pairs completes the folder
     return list_.commit();
   }
 
  private:
-  /// Into a file of `part`; its name.
+  /// Writes a file into the folder `part`; returns its name.
   core::Result<std::string> write(const std::string& part, const std::string& name,
                                   const StoredImage& image) {
     StoredImage file = image;

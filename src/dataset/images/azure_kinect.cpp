@@ -70,6 +70,7 @@ const json& value_at(const json& object, std::initializer_list<const char*> keys
   return *here;
 }
 
+/// All numbers of an array of that length; none if one is missing or not finite.
 std::optional<std::vector<double>> finite_numbers(const json& array, std::size_t count) {
   if (!array.is_array() || array.size() != count) return std::nullopt;
   std::vector<double> numbers;
@@ -80,6 +81,7 @@ std::optional<std::vector<double>> finite_numbers(const json& array, std::size_t
   return numbers;
 }
 
+/// The first camera with that purpose; null if none has it.
 const json& camera_for(const json& calibration, const char* purpose) {
   static const json nothing;
   const json& cameras = value_at(calibration, {"CalibrationInformation", "Cameras"});
@@ -104,6 +106,7 @@ core::Result<AzureCamera> camera_in_mode(const json& camera, const AzureMode& mo
     return core::input_error(
         fmt::format("its calibration has the lens model '{}', which is not known", model));
 
+  // Intrinsics, distortion and pose in the rig
   const auto n = finite_numbers(value_at(camera, {"Intrinsics", "ModelParameters"}), 14);
   const auto r = finite_numbers(value_at(camera, {"Rt", "Rotation"}), 9);
   const auto t = finite_numbers(value_at(camera, {"Rt", "Translation"}), 3);
@@ -113,6 +116,7 @@ core::Result<AzureCamera> camera_in_mode(const json& camera, const AzureMode& mo
         "are needed, and a centre of distortion of 0");
   }
 
+  // Intrinsics are shares of the sensor's size
   AzureCamera result;
   constexpr double kCentreOfFirstPixel = 0.5;
   result.pinhole = {mode.width,
@@ -122,6 +126,7 @@ core::Result<AzureCamera> camera_in_mode(const json& camera, const AzureMode& mo
                     (*n)[0] * mode.sensor_width - mode.crop_x - kCentreOfFirstPixel,
                     (*n)[1] * mode.sensor_height - mode.crop_y - kCentreOfFirstPixel};
 
+  // OpenCV's order of the coefficients
   const std::vector<double>& k = *n;
   result.lens.k = {k[4], k[5], k[13], k[12], k[6], k[7], k[8], k[9]};
   const Eigen::Matrix3d rotation = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r->data());
@@ -186,6 +191,7 @@ std::optional<std::pair<int, int>> azure_depth_size(const std::string& depth_mod
 
 core::Result<sensor::Camera> azure_kinect_camera(const std::string& calibration,
                                                  const std::string& depth_mode, int color_height) {
+  // The modes tell size and cropping of images
   const AzureMode* depth = depth_mode_of(depth_mode);
   const AzureMode* color = color_mode_of(color_height);
   if (depth == nullptr) {
@@ -199,6 +205,7 @@ core::Result<sensor::Camera> azure_kinect_camera(const std::string& calibration,
                     mode_names(kColorModes)));
   }
 
+  // The calibration holds both cameras
   const auto parsed = core::parse_json(calibration, "calibration.json");
   if (!parsed) return tl::unexpected(parsed.error());
   const auto depth_camera = camera_in_mode(camera_for(*parsed, "PurposeDepth"), *depth);
@@ -207,6 +214,7 @@ core::Result<sensor::Camera> azure_kinect_camera(const std::string& calibration,
   const auto color_camera = camera_in_mode(camera_for(*parsed, "PurposePhotoVideo"), *color);
   if (!color_camera) return tl::unexpected(color_camera.error());
 
+  // Both poses are relative to the rig
   sensor::Camera camera;
   camera.name = "azure_kinect";
   camera.color = color_camera->pinhole;
@@ -225,6 +233,8 @@ core::Result<std::unique_ptr<AzureKinectFile>> AzureKinectFile::open(const std::
   ContainerContents contents;
   opened->container_ = (*demuxer)->open(file.c_str(), contents);
   if (opened->container_ == nullptr) return core::input_error(file + ": is not a readable Matroska file");
+
+  // Any Matroska film can be opened up to here
   if (auto understood = opened->understand(contents); !understood) {
     return core::input_error(fmt::format("{}: is not an Azure Kinect recording with colour and depth: {}",
                                          file, understood.error().message));
@@ -238,6 +248,7 @@ AzureKinectFile::~AzureKinectFile() {
 }
 
 core::Result<void> AzureKinectFile::understand(const ContainerContents& contents) {
+  // Tracks are known by title or mode
   for (std::size_t i = 0; i < contents.tracks.size(); ++i) {
     const ContainerTrack& track = contents.tracks[i];
     const std::string title = tag_of(track, "title");
@@ -245,6 +256,7 @@ core::Result<void> AzureKinectFile::understand(const ContainerContents& contents
     if (title == "DEPTH" || !tag_of(track, "K4A_DEPTH_MODE").empty()) depth_ = {static_cast<int>(i), track};
   }
 
+  // Both tracks must be decodable
   if (color_.number < 0) return core::input_error("it has no track COLOR");
   if (depth_.number < 0) return core::input_error("it has no track DEPTH");
   if (!is_color_format(color_.info)) {
@@ -257,19 +269,22 @@ core::Result<void> AzureKinectFile::understand(const ContainerContents& contents
                                          depth_.info.fourcc));
   }
 
+  // The device attaches its factory's calibration
   const auto calibration =
       std::find_if(contents.attachments.begin(), contents.attachments.end(),
                    [](const ContainerAttachment& a) { return a.name == "calibration.json"; });
   if (calibration == contents.attachments.end())
     return core::input_error("it has no attachment calibration.json");
 
+  // The calibration depends on both modes
   color_mode_ = tag_of(color_.info, "K4A_COLOR_MODE");
   depth_mode_ = tag_of(depth_.info, "K4A_DEPTH_MODE");
   auto camera = azure_kinect_camera(std::string(calibration->bytes.begin(), calibration->bytes.end()),
                                     depth_mode_, color_.info.height);
   if (!camera) return tl::unexpected(camera.error());
-
   camera_ = std::move(*camera);
+
+  // Intrinsics hold only for the modes' sizes
   const bool sizes = camera_.color.width == color_.info.width && camera_.depth->width == depth_.info.width &&
                      camera_.depth->height == depth_.info.height;
   if (!sizes) return core::input_error("its images have other sizes than its modes");
@@ -279,6 +294,8 @@ core::Result<void> AzureKinectFile::understand(const ContainerContents& contents
 
 void AzureKinectFile::list_stamps() {
   ContainerPacket packet;
+
+  // Only the packets hold the stamps
   demuxer_.seek(container_, color_.number, 0);
   while (demuxer_.next(container_, packet, false)) {
     for (Track* track : {&color_, &depth_}) {
@@ -295,6 +312,7 @@ const ContainerPacket* AzureKinectFile::passed(int track, std::int64_t stamp_us)
   return found == recent_.end() ? nullptr : &*found;
 }
 
+/// Keeps the last packets: at most 64 and 64 MB, but at least two.
 void AzureKinectFile::remember(ContainerPacket packet) {
   constexpr std::size_t kMost = 64;
   constexpr std::size_t kMostBytes = 64'000'000;
@@ -313,6 +331,7 @@ core::Result<Bytes> AzureKinectFile::packet_of(const Track& track, std::int64_t 
   const std::lock_guard lock(mutex_);
   if (const ContainerPacket* known = passed(track.number, stamp_us)) return known->bytes;
 
+  // Steps back and far jumps need a seek
   if (at_us_ < 0 || stamp_us <= at_us_ || stamp_us > at_us_ + kFar_us) {
     recent_.clear();
     if (!demuxer_.seek(container_, track.number, stamp_us))
@@ -320,11 +339,13 @@ core::Result<Bytes> AzureKinectFile::packet_of(const Track& track, std::int64_t 
           fmt::format("{}: {:.6f} s cannot be found", file_, 1e-6 * static_cast<double>(stamp_us)));
   }
 
+  // Packets of the other track are kept, too
   ContainerPacket packet;
-
   while (demuxer_.next(container_, packet, true)) {
     const bool ours = packet.track == color_.number || packet.track == depth_.number;
     if (!ours) continue;
+
+    // The packet may follow those of the other track
     const bool it = packet.track == track.number && packet.stamp_us == stamp_us;
     const bool past = packet.stamp_us > stamp_us + kBehind_us;
     at_us_ = packet.stamp_us;
@@ -333,6 +354,7 @@ core::Result<Bytes> AzureKinectFile::packet_of(const Track& track, std::int64_t 
     if (past) break;
   }
 
+  // After an error the next call seeks
   at_us_ = -1;
   return core::input_error(
       fmt::format("{}: the image at {:.6f} s cannot be read", file_, 1e-6 * static_cast<double>(stamp_us)));
@@ -346,6 +368,7 @@ core::Result<cv::Mat> AzureKinectFile::read(ImageId id) {
     return core::input_error(fmt::format("{}: truncated or damaged: {}", describe(id), what));
   };
 
+  // Compressed colour
   if (track.info.codec == "mjpeg") {
     if (!is_jpeg(*bytes)) return damaged("no JPEG");
     Decoded image = decode_jpeg(*bytes);
@@ -353,6 +376,7 @@ core::Result<cv::Mat> AzureKinectFile::read(ImageId id) {
     return std::move(*image);
   }
 
+  // Raw pixels of depth or colour
   cv::Mat image = id.list == ImageList::kDepth ? decode_b16g(*bytes, track.info.width, track.info.height)
                                                : decode_raw_color(track.info, *bytes);
   if (image.empty()) return damaged("the packet has another size than the image");

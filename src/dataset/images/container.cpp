@@ -30,6 +30,7 @@ std::map<std::string, std::string> tags_of(const AVDictionary* dictionary) {
   return tags;
 }
 
+/// The printable characters of the code, lowest byte first.
 std::string fourcc_of(std::uint32_t tag) {
   std::string text;
   for (unsigned shift = 0; shift < 32; shift += 8) {
@@ -47,6 +48,8 @@ ContainerContents contents_of(const AVFormatContext& context) {
     const AVCodecParameters& codec = *stream.codecpar;
     ContainerTrack track{avcodec_get_name(codec.codec_id), fourcc_of(codec.codec_tag), codec.width,
                          codec.height, tags_of(stream.metadata)};
+
+    // FFmpeg lists attachments as streams
     if (codec.codec_type == AVMEDIA_TYPE_ATTACHMENT) {
       const auto* bytes = codec.extradata;
       contents.attachments.push_back(
@@ -57,6 +60,7 @@ ContainerContents contents_of(const AVFormatContext& context) {
   return contents;
 }
 
+/// Null if the file is not readable as Matroska.
 void* open_container(const char* file, ContainerContents& contents) {
   av_log_set_level(AV_LOG_QUIET);  // callers report errors with the file's name
   AVFormatContext* context = nullptr;
@@ -71,11 +75,13 @@ bool next_packet(void* container, ContainerPacket& packet, bool with_bytes) {
                                                             [](AVPacket* p) { av_packet_free(&p); });
   if (read == nullptr || av_read_frame(context_of(container), read.get()) < 0) return false;
 
+  // The stamp of decoding replaces a missing one
   packet.track = read->stream_index;
   const AVRational base = context_of(container)->streams[read->stream_index]->time_base;
   const std::int64_t pts = read->pts != AV_NOPTS_VALUE ? read->pts : read->dts;
   packet.stamp_us = av_rescale_q(pts == AV_NOPTS_VALUE ? 0 : pts, base, kMicroseconds);
 
+  // Bytes are not needed to list the stamps
   packet.bytes.clear();
   if (with_bytes) packet.bytes.assign(read->data, read->data + read->size);
   return true;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Packets of a Matroska file as they are stored. The demuxer is a part of its own (core/part.hpp): FFmpeg's
+// Packets of a Matroska file as they are stored. The demuxer is a separate part (core/part.hpp): FFmpeg's
 // libavformat.
 #include <cstdint>
 #include <map>

@@ -56,14 +56,18 @@ cv::Mat read_channel(const Bytes& bytes) {
   const Imath::Box2i window = file.header().dataWindow();
   const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
   const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
+
+  // Sizes of damaged headers are not allocated
   const std::string channel = depth_channel(file.header().channels());
   if (channel.empty() || width < 1 || height < 1 || width > 32768 || height > 32768 ||
       width * height > kMaxPixels)
     return {};
 
+  // Subsampled channels are not depth
   const Imf::Channel* sampled = file.header().channels().findChannel(channel.c_str());
   if (sampled == nullptr || sampled->xSampling != 1 || sampled->ySampling != 1) return {};
 
+  // OpenEXR counts pixels from the origin, not the window
   cv::Mat image(static_cast<int>(height), static_cast<int>(width), CV_32FC1, cv::Scalar(0));
   const std::size_t row = image.step[0];
   char* const origin = reinterpret_cast<char*>(image.data) - window.min.x * std::ptrdiff_t{sizeof(float)} -
@@ -83,6 +87,7 @@ bool is_exr(const Bytes& file) {
   return file.size() > kMagic.size() && std::memcmp(file.data(), kMagic.data(), kMagic.size()) == 0;
 }
 
+/// Empty if the file is damaged: OpenEXR reports that as exceptions.
 cv::Mat decode_exr(const Bytes& file) {
   try {
     return read_channel(file);

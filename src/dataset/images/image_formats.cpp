@@ -14,6 +14,7 @@ void check_memory(const cv::Exception& problem) {
   if (problem.code == cv::Error::StsNoMem) throw std::bad_alloc();
 }
 
+/// Empty if the image cannot be decoded.
 cv::Mat decode(const Bytes& file) {
   if (is_exr(file)) return decode_exr(file);
   try {
@@ -39,6 +40,7 @@ Bytes encode_png(const cv::Mat& image, int level) {
   return bytes;
 }
 
+/// Empty if the image cannot be encoded.
 Bytes encode_tiff(const cv::Mat& image) {
   Bytes bytes;
   try {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// OpenCV's image formats, a part of its own (core/part.hpp): read_image decodes what recordings are made of
+// OpenCV's image formats, a separate part (core/part.hpp): read_image decodes what recordings are made of
 // without it.
 #include "images/image_decoders.hpp"
 #include "plumbline/core/part.hpp"

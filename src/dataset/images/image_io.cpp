@@ -26,6 +26,8 @@ core::Result<Bytes> read_bytes(const std::filesystem::path& file) {
   if (error) return core::input_error(fmt::format("{}: cannot be read: {}", file.string(), error.message()));
   if (size > kMaxFileBytes)
     return core::input_error(fmt::format("{}: too large for an image", file.string()));
+
+  // Shortages of the system are not bad input
   errno = 0;
   std::ifstream stream(file, std::ios::binary);
   if (const std::string shortage = stream ? "" : core::shortage_of(errno); !shortage.empty())
@@ -64,6 +66,8 @@ core::Result<cv::Mat> decode_image(const std::string& name, const Bytes& file) {
                   : is_npy(file)  ? decode_npy(file)
                                   : decode_other(file);
   if (image) return std::move(*image);
+
+  // An LFS pointer may replace the image
   const std::string_view text(reinterpret_cast<const char*>(file.data()), file.size());
   if (core::begins_as_lfs_pointer(text)) return core::input_error(name + ": " + core::kLfsPointer);
   return core::input_error(fmt::format("{}: truncated or damaged: {}", name, image.error()));

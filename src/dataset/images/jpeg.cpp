@@ -31,6 +31,8 @@ struct JpegErrors {
 
 std::vector<std::uint8_t> encode_jpeg(const cv::Mat& bgr, int quality) {
   if (bgr.type() != CV_8UC3 || bgr.empty()) return {};
+
+  // Without a handler libjpeg ends the program
   jpeg_compress_struct info;
   JpegErrors errors;
   unsigned char* bytes = nullptr;
@@ -38,6 +40,7 @@ std::vector<std::uint8_t> encode_jpeg(const cv::Mat& bgr, int quality) {
   info.err = jpeg_std_error(&errors.base);
   errors.base.error_exit = &leave_jpeg;
 
+  // Errors of libjpeg continue here
   if (setjmp(errors.jump) != 0) {
     jpeg_destroy_compress(&info);
     std::free(bytes);
@@ -45,6 +48,7 @@ std::vector<std::uint8_t> encode_jpeg(const cv::Mat& bgr, int quality) {
     return {};
   }
 
+  // Settings for colours in OpenCV's order
   jpeg_create_compress(&info);
   jpeg_mem_dest(&info, &bytes, &size);
   info.image_width = static_cast<JDIMENSION>(bgr.cols);
@@ -54,9 +58,12 @@ std::vector<std::uint8_t> encode_jpeg(const cv::Mat& bgr, int quality) {
   jpeg_set_defaults(&info);
   jpeg_set_quality(&info, quality, TRUE);
   info.optimize_coding = TRUE;
+
+  // Chroma is subsampled only at lower quality
   constexpr int kFine = 90;  // from here on colour is as sharp as brightness
   if (quality >= kFine) info.comp_info[0].h_samp_factor = info.comp_info[0].v_samp_factor = 1;
 
+  // Rows are encoded without a copy
   jpeg_start_compress(&info, TRUE);
   while (info.next_scanline < info.image_height) {
     auto* row = const_cast<JSAMPLE*>(bgr.ptr<JSAMPLE>(static_cast<int>(info.next_scanline)));
@@ -75,11 +82,13 @@ std::vector<std::uint8_t> encode_small_jpeg(const cv::Mat& bgr) {
   constexpr std::size_t kMostBytes = 5000;
   if (bgr.empty()) return {};
 
+  // Averaging over areas avoids aliasing
   cv::Mat small;
   const double scale = static_cast<double>(kWidth) / bgr.cols;
   const int height = std::max(1, static_cast<int>(std::lround(bgr.rows * scale)));
   cv::resize(bgr, small, {kWidth, height}, 0.0, 0.0, cv::INTER_AREA);
 
+  // The best quality within the size limit
   for (int quality = 70; quality >= 10; quality -= 15) {
     std::vector<std::uint8_t> bytes = encode_jpeg(small, quality);
     if (bytes.size() <= kMostBytes) return bytes;

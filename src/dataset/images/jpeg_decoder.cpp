@@ -100,6 +100,8 @@ Decoded decode_jpeg(const Bytes& file) {
   cv::Mat image;
   const bool done = decode(info, errors, file, image);
   const bool adobe = info.saw_Adobe_marker != 0;
+
+  // Lack of memory is not the image's fault
   jpeg_destroy_decompress(&info);
   if (!done && errors.base.msg_code == JERR_OUT_OF_MEMORY) throw std::bad_alloc();
   if (done) return image.channels() == 4 ? from_cmyk(image, adobe) : image;

@@ -25,6 +25,8 @@ std::optional<NpyHeader> npy_header(const Bytes& file) {
   constexpr std::size_t kVersion1 = 10;
   constexpr std::size_t kLater = 12;
   if (file.size() < kLater) return std::nullopt;
+
+  // Version 1 has a length of two bytes
   const bool first = file[6] == 1;
   const std::size_t begin = first ? kVersion1 : kLater;
   std::size_t length = file[8] + (std::size_t{file[9]} << 8U);
@@ -59,6 +61,7 @@ std::vector<std::int64_t> npy_shape(std::string_view text) {
   return shape;
 }
 
+/// OpenCV's type of the numbers; -1 if there is none.
 int npy_type(std::string_view text) {
   for (const auto& [name, type] :
        {std::pair("'<f4'", CV_32FC1), std::pair("'<f8'", CV_64FC1), std::pair("'<u2'", CV_16UC1)}) {
@@ -77,6 +80,8 @@ bool is_npy(const Bytes& file) {
 Decoded decode_npy(const Bytes& file) {
   const auto header = npy_header(file);
   if (!header) return tl::unexpected<std::string>("the file ends within the header of .npy");
+
+  // Images are two-dimensional and stored row by row
   const int type = npy_type(after_key(header->text, "descr"));
   const std::vector<std::int64_t> shape = npy_shape(after_key(header->text, "shape"));
   const std::string_view order = after_key(header->text, "fortran_order");
@@ -84,6 +89,8 @@ Decoded decode_npy(const Bytes& file) {
     return tl::unexpected<std::string>(
         "this .npy is not an image: it needs two dimensions of '<f4', '<f8' or '<u2', row by row");
   }
+
+  // Sizes of damaged headers are not allocated
   if (shape[0] * shape[1] > kMaxPixels || shape[0] * shape[1] < 1)
     return tl::unexpected(fmt::format("{}x{} is not the size of an image", shape[1], shape[0]));
   const std::size_t bytes = static_cast<std::size_t>(shape[0] * shape[1]) * CV_ELEM_SIZE(type);

@@ -51,14 +51,18 @@ std::string read_chunks(const Bytes& file, Header& header, Bytes& compressed) {
     const std::size_t length = big_endian(&file[at]);
     if (length > file.size() - at - kChunkOverhead) return "the file ends before the image does";
 
+    // A wrong checksum means a damaged file
     const std::uint8_t* type = &file[at + 4];
     const std::uint8_t* data = &file[at + 8];
     if (libdeflate_crc32(0, type, length + 4) != big_endian(data + length)) {
       return fmt::format("checksum is wrong at byte {}", at);
     }
 
+    // Other chunks do not alter the pixels
     if (std::memcmp(type, "IHDR", 4) == 0 && length == 13) {
       if (big_endian(data) - 1 >= 1U << 24 || big_endian(data + 4) - 1 >= 1U << 24) return "impossible size";
+
+      // Size, bit depth, colour type and interlacing
       header = {static_cast<int>(big_endian(data)), static_cast<int>(big_endian(data + 4)), data[8], data[9],
                 data[12]};
       have_header = true;
@@ -135,6 +139,7 @@ bool unfilter_row(int filter, std::uint8_t* row, const std::uint8_t* above, std:
   }
 }
 
+/// Undoes the filters, for `B` bytes a pixel; false if one is not known.
 template <std::size_t B>
 bool unfilter(const Header& header, std::uint8_t* pixels) {
   const std::size_t size = header.row_bytes();

@@ -10,6 +10,7 @@ namespace {
 
 cv::VideoCapture& capture(void* video) { return *static_cast<cv::VideoCapture*>(video); }
 
+/// Null if the file is not a video that can be decoded.
 void* open_video(const char* file) {
   try {
     auto video = std::make_unique<cv::VideoCapture>(file, cv::CAP_FFMPEG);
@@ -31,6 +32,7 @@ bool seek_frame(void* video, std::int64_t frame) {
 
 bool skip_frame(void* video) { return capture(video).grab(); }
 
+/// False after the last frame or at a damaged one.
 bool next_frame(void* video, cv::Mat& image) {
   try {
     return capture(video).read(image);

@@ -26,12 +26,15 @@ core::Result<void> VideoFrames::open() {
   decoder_ = *decoder;
   video_ = decoder_->open(file_.c_str());
   if (video_ != nullptr) return {};
+
+  // An LFS pointer may replace the video
   const bool pointer = core::is_lfs_pointer(file_);
   return core::input_error(file_ + ": " +
                            (pointer ? core::kLfsPointer : "is not a video that can be decoded"));
 }
 
 bool VideoFrames::go_to(std::int64_t frame) {
+  // Short distances are faster without a seek
   const bool far = frame < next_ || frame > next_ + kSkipAtMost;
   if (far && !decoder_->seek(video_, frame)) return false;
   if (far) next_ = frame;
@@ -48,6 +51,8 @@ core::Result<cv::Mat> VideoFrames::read(std::int64_t frame) {
   cv::Mat image;
   if (!go_to(frame) || !decoder_->next(video_, image) || image.type() != CV_8UC3)
     return core::input_error(fmt::format("{}: frame {} cannot be decoded", file_, frame));
+
+  // Neighbouring frames may be read again
   next_ = frame + 1;
   recent_[frame] = image.clone();
   if (recent_.size() > kRecent) recent_.erase(recent_.begin());

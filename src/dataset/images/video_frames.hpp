@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Frames of a video by their number. The decoder is a part of its own (core/part.hpp): OpenCV's brings
+// Frames of a video by their number. The decoder is a separate part (core/part.hpp): OpenCV's brings
 // FFmpeg.
 #include <cstdint>
 #include <map>

@@ -40,6 +40,7 @@ core::Result<Layout> read_azure_kinect(const fs::path& path, const LayoutOptions
   layout.format = "azure-kinect";
   layout.pairs = pair_by_stamp(color, depth, options.max_pair_gap_s, options.depth_delay_s);
 
+  // Without pairs the message names the reason
   if (layout.pairs.empty()) {
     return core::input_error(color.empty() || depth.empty()
                                  ? fmt::format("{}: holds {} colour and {} depth images; both are needed",
@@ -47,10 +48,12 @@ core::Result<Layout> read_azure_kinect(const fs::path& path, const LayoutOptions
                                  : no_common_time("colour", color, "depth", depth, options.max_pair_gap_s));
   }
 
+  // Images without a partner are reported
   const std::size_t unmatched = color.size() + depth.size() - 2 * layout.pairs.size();
   if (unmatched > 0)
     log.warning(fmt::format("{}: {} images have no partner and are skipped", path.string(), unmatched));
 
+  // The file holds the factory's calibration
   sensor::CameraReading camera;
   camera.program = fmt::format("Azure Kinect (its factory's calibration, {}, {})", (*file)->color_mode(),
                                (*file)->depth_mode());

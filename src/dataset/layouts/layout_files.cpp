@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Helpers for the readers of several layouts: numbered images, poses in files of their own.
+// Helpers for the readers of several layouts: numbered images, poses in separate files.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -50,6 +50,7 @@ geometry::Rigid3 from_arkit(const geometry::Rigid3& transform) {
          geometry::Rigid3(camera, Eigen::Vector3d::Zero());
 }
 
+/// The numbers of at most 18 digits in a file's name, in order.
 std::vector<long long> numbers_of(const std::string& name) {
   std::vector<long long> numbers;
   for (std::size_t i = 0; i < name.size();) {
@@ -61,6 +62,7 @@ std::vector<long long> numbers_of(const std::string& name) {
   return numbers;
 }
 
+/// The images of a folder by the first number after the prefix.
 NumberedFiles numbered_images(const fs::path& folder, const std::string& prefix) {
   std::vector<fs::path> files;
   std::error_code ignored;
@@ -69,6 +71,8 @@ NumberedFiles numbered_images(const fs::path& folder, const std::string& prefix)
     if (wanted && is_image(entry.path())) files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end());
+
+  // The first of two files with one number counts
   std::map<long long, std::string> images;
   for (const fs::path& file : files) {
     const std::vector<long long> numbers = numbers_of(file.stem().string().substr(prefix.size()));
@@ -77,6 +81,7 @@ NumberedFiles numbered_images(const fs::path& folder, const std::string& prefix)
   return {images.begin(), images.end()};
 }
 
+/// Pairs colour and depth of the same number; the stamp is number / fps.
 Layout numbered_layout(const char* format, const NumberedFiles& color, const NumberedFiles& depth,
                        double fps) {
   const auto images = std::make_shared<FileImages>();
@@ -95,9 +100,12 @@ Layout numbered_layout(const char* format, const NumberedFiles& color, const Num
   return layout;
 }
 
+/// A 4x4 matrix; none if a number is missing or not finite.
 std::optional<geometry::Rigid3> read_pose_file(const std::string& file) {
   const auto lines = read_lines(file);
   if (!lines || lines->size() != 4) return std::nullopt;
+
+  // Four rows of four finite numbers
   Eigen::Matrix4d matrix;
   for (std::size_t r = 0; r < 4; ++r) {
     const std::vector<std::string>& words = (*lines)[r].words;
@@ -108,6 +116,8 @@ std::optional<geometry::Rigid3> read_pose_file(const std::string& file) {
       matrix(static_cast<int>(r), static_cast<int>(c)) = *value;
     }
   }
+
+  // Damaged or scaled matrices are rejected
   const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
   if ((rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > 0.01) {
     return std::nullopt;

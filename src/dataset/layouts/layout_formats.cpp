@@ -46,12 +46,14 @@ std::string what_is_there(const fs::path& folder) {
     }
   }
 
+  // At most eight folders are named
   std::sort(seen.begin(), seen.end());
   constexpr std::size_t kMost = 8;
   const std::size_t folders = seen.size();
   seen.resize(std::min(folders, kMost));
   if (folders > kMost) seen.push_back(fmt::format("{} more folders", folders - kMost));
 
+  // Endings follow until the list is full
   for (const auto& [ending, count] : endings) {
     if (seen.size() < 2 * kMost)
       seen.push_back(fmt::format("{} {} file{}", count, ending, count == 1 ? "" : "s"));
@@ -89,6 +91,7 @@ std::string nearest_layout(const fs::path& folder) {
       }
     }
 
+    // The share of parts decides, not their number
     const double share = static_cast<double>(there) / static_cast<double>(format->parts.size());
     if (share <= best) continue;
     best = share;
@@ -128,12 +131,14 @@ bool is_part_of_recording(const fs::path& file) {
   const fs::path real = fs::weakly_canonical(file, ec);
   if (ec || !fs::exists(real, ec)) return false;
 
+  // Parts are at most three folders deep
   std::string part = real.filename().string();  // the folder or file below `folder`
   fs::path folder = real.parent_path();
   constexpr int kDepth = 3;
 
   for (int i = 0; i < kDepth; ++i) {
     if (const LayoutFormat* format = layout_of(folder)) {
+      // Names that every layout may have, then its own
       std::vector<std::string> names{
           "camera.yaml", "groundtruth.txt", "rgb.txt", "depth.txt", "associations.txt", "rgb", "depth"};
       for (const std::string& alternatives : format->parts) {
@@ -153,6 +158,8 @@ std::string not_a_recording_file(const fs::path& file) {
   std::array<char, 4> magic{};
   std::ifstream(file, std::ios::binary).read(magic.data(), magic.size());
   const bool zip = magic == std::array<char, 4>{'P', 'K', '\x03', '\x04'};
+
+  // Record3D can export a readable format
   if (file.extension() == ".r3d") {
     return fmt::format(
         "{}: is a recording of Record3D, whose depth is packed with LZFSE, which is not read; export it on "
@@ -172,9 +179,12 @@ std::string not_a_recording(const fs::path& folder) {
     looked_for +=
         fmt::format("{}{} ({})", looked_for.empty() ? "" : ", ", format->looked_for, format->program);
   }
+
+  // An LFS pointer explains the missing files
   if (const fs::path pointer = lfs_pointer_in(folder); !pointer.empty())
     return fmt::format("{}: {}", pointer.string(), core::kLfsPointer);
 
+  // The user sees what the folder holds
   const std::string seen = what_is_there(folder);
   std::string text = fmt::format("{}: {}; looked for {}", folder.string(),
                                  seen.empty() ? "the folder is empty" : "no recording found", looked_for);

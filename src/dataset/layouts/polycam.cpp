@@ -43,6 +43,7 @@ core::Result<PolycamFrame> read_polycam_camera(const fs::path& file) {
     return value.value_or(0.0);
   };
 
+  // The rows of world_from_camera in ARKit's axes
   Eigen::Matrix<double, 3, 4> t;
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 4; ++column)
@@ -57,12 +58,14 @@ core::Result<PolycamFrame> read_polycam_camera(const fs::path& file) {
                    number("cx"),
                    number("cy")};
 
+  // A pose is rigid up to rounding
   const Eigen::Matrix3d rotation = t.leftCols<3>();
   const double bent = (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!whole) return core::input_error(file.string() + ": holds no camera: a number is missing");
   if (!(bent < 0.01))
     return core::input_error(file.string() + ": the transform is not a rotation and a shift");
 
+  // Implausible intrinsics are reported, not used
   sensor::Camera camera;
   camera.color = frame.pinhole;
   if (const std::string wrong = sensor::camera_problem(camera); !wrong.empty())

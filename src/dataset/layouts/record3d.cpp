@@ -59,6 +59,7 @@ std::optional<geometry::Rigid3> record3d_pose(const json& row) {
 }
 
 core::Result<sensor::CameraReading> record3d_camera(const fs::path& file, const json& metadata) {
+  // A camera needs K and the image's size
   const auto k =
       metadata.is_object() && metadata.contains("K") ? numbers_of_array<9>(metadata["K"]) : std::nullopt;
   const auto width = json_number(metadata, "w");
@@ -71,6 +72,7 @@ core::Result<sensor::CameraReading> record3d_camera(const fs::path& file, const 
   sensor::CameraReading reading;
   reading.program = "Record3D (metadata.json)";
 
+  // K is stored column by column
   sensor::Camera& camera = reading.camera;
   camera.name = "record3d";
   camera.color = {static_cast<int>(std::clamp(*width, 0.0, 1e5)),
@@ -81,6 +83,7 @@ core::Result<sensor::CameraReading> record3d_camera(const fs::path& file, const 
                   (*k)[7]};
   camera.fps = json_number(metadata, "fps").value_or(30.0);
 
+  // Implausible numbers are reported, not used
   if (const std::string wrong = sensor::camera_problem(camera); !wrong.empty())
     return core::input_error(fmt::format("{}: {}", file.string(), wrong));
   return reading;
@@ -129,6 +132,8 @@ core::Result<Layout> read_record3d(const fs::path& folder, const LayoutOptions& 
     const json& stamp = element(metadata, "frameTimestamps", number);
     if (stamp.is_number() && std::isfinite(stamp.get<double>()))
       pair.stamp = pair.depth_stamp = stamp.get<double>();
+
+    // Frames without a pose are counted
     if (const auto pose = record3d_pose(element(metadata, "poses", number))) {
       poses.push_back({pair.stamp, *pose});
     } else {
@@ -136,6 +141,7 @@ core::Result<Layout> read_record3d(const fs::path& folder, const LayoutOptions& 
     }
   }
 
+  // Numbers need not be in the order of time
   const auto earlier = [](const auto& a, const auto& b) { return a.stamp < b.stamp; };
   std::stable_sort(layout.pairs.begin(), layout.pairs.end(), earlier);
   std::stable_sort(poses.begin(), poses.end(), earlier);
@@ -147,6 +153,8 @@ core::Result<Layout> read_record3d(const fs::path& folder, const LayoutOptions& 
 
   const fs::path confidence = place / "confidence";
   if (is_folder(confidence)) layout.confidence = confidence.string();
+
+  // The phone's poses are odometry, not ground truth
   if (!poses.empty()) {
     layout.truth = std::move(poses);
     layout.truth_is_odometry = true;

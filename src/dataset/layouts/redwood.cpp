@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Redwood and Open3D layout: color/, image/ or rgb/ beside depth/, files matched by their number;
+// Redwood and Open3D layout: color/, image/ or rgb/, and depth/, files matched by their number;
 // trajectory.log (Choi, Zhou, Koltun: Robust Reconstruction of Indoor Scenes, CVPR 2015) as truth.
 #include <fmt/format.h>
 
@@ -55,11 +55,13 @@ geometry::Trajectory read_log(const fs::path& file, const std::vector<PairInfo>&
       }
     }
 
+    // A pose is rigid up to rounding
     const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
     const double error =
         (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
     good = good && matrix.allFinite() && error < 0.01;
 
+    // The truth ends at the first damaged pose
     if (!good) {
       log.warning(fmt::format("{}:{}: is not the pose of a pair; the truth ends here", file.string(),
                               (*lines)[i].number));
@@ -100,6 +102,8 @@ core::Result<Layout> read_redwood(const fs::path& folder, const LayoutOptions& o
   Layout layout = numbered_layout("redwood", color, depth, options.fps);
   const auto c = by_stamp(color);
   const auto d = by_stamp(depth);
+
+  // Stamps may differ a little, numbers may not
   if (c && d) {
     layout.pairs = pair_by_stamp(*c, *d, options.max_pair_gap_s);
     layout.images = images_of(*c, *d);
@@ -109,6 +113,7 @@ core::Result<Layout> read_redwood(const fs::path& folder, const LayoutOptions& o
     }
   }
 
+  // The numbers of both folders must overlap
   if (layout.pairs.empty()) {
     return core::input_error(
         fmt::format("{}: no number is in both {}/ ({} to {}) and depth/ ({} to {}); colour and depth are "
@@ -117,6 +122,7 @@ core::Result<Layout> read_redwood(const fs::path& folder, const LayoutOptions& o
                     depth.front().first, depth.back().first));
   }
 
+  // Images without a partner are reported
   const std::size_t unmatched = color.size() + depth.size() - 2 * layout.pairs.size();
   if (unmatched > 0) {
     log.warning(fmt::format("{}: {} images have no partner and are skipped", folder.string(), unmatched));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Replica as NICE-SLAM renders it: results/frame000000.jpg and results/depth000000.png, traj.txt with 16
-// numbers per frame; cam_params.json beside or above is found by the camera's search.
+// numbers per frame; cam_params.json there or one level up is found by the camera's search.
 #include <fmt/format.h>
 
 #include "layout.hpp"
@@ -39,6 +39,8 @@ core::Result<Layout> read_replica(const fs::path& folder, const LayoutOptions& o
         fmt::format("{}: no number is in both names, frame000000.jpg ({} of these) and depth000000.png ({})",
                     (folder / "results").string(), color.size(), depth.size()));
   }
+
+  // Rows of the truth are numbered like images
   layout.truth = replica_truth(folder / "traj.txt", options.fps, log);
   return layout;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // ScanNet's exported frames: color/0.jpg, depth/0.png, pose/0.txt, intrinsic/intrinsic_color.txt and
-// intrinsic_depth.txt. Colour and depth have sizes and calibrations of their own; numbers have no zeros in
+// intrinsic_depth.txt. Colour and depth differ in size and calibration; numbers have no zeros in
 // front.
 #include <fmt/format.h>
 
@@ -20,6 +20,7 @@ geometry::Trajectory scannet_truth(const fs::path& folder, const Layout& layout,
   geometry::Trajectory truth;
   std::size_t left_out = 0;
 
+  // Each colour image has a file with its pose
   for (const PairInfo& pair : layout.pairs) {
     const fs::path file = folder / "pose" / (layout.images->file(pair.color).stem().string() + ".txt");
     if (!is_file(file)) continue;
@@ -30,6 +31,7 @@ geometry::Trajectory scannet_truth(const fs::path& folder, const Layout& layout,
     }
   }
 
+  // ScanNet marks lost poses as infinite
   if (left_out > 0) {
     log.warning(
         fmt::format("{}: {} of {} poses are not finite or no rigid motion, and are left out of the truth",
@@ -47,6 +49,8 @@ core::Result<Layout> read_scannet(const fs::path& folder, const LayoutOptions& o
     return core::input_error(fmt::format("{}: no number is in both color/ ({} images) and depth/ ({})",
                                          folder.string(), color.size(), depth.size()));
   }
+
+  // Images without a partner are reported
   const std::size_t unmatched = color.size() + depth.size() - 2 * layout.pairs.size();
   if (unmatched > 0)
     log.warning(fmt::format("{}: {} images have no partner and are skipped", folder.string(), unmatched));

@@ -37,18 +37,23 @@ std::map<int, FrameFiles> list_frames(const fs::path& folder) {
     const std::size_t dot = name.find('.');
     const std::optional<int> number = frame_number(name.substr(0, dot));
     if (!number || dot == std::string::npos) continue;
+
+    // Images and pose share the frame's number
     const std::string rest = name.substr(dot);
     const std::string file = entry.path().string();
     if (rest == ".color.png" || rest == ".color.jpg" || rest == ".color.jpeg") {
       std::string& color = frames[*number].color;
       if (color.empty() || file < color) color = file;  // the same choice whatever the order of the folder
     }
+
+    // Depth and pose have one file each
     if (rest == ".depth.png") frames[*number].depth = file;
     if (rest == ".pose.txt") frames[*number].pose = file;
   }
   return frames;
 }
 
+/// One name with a frame's number is enough.
 bool looks_like_seven_scenes(const fs::path& folder) {
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(folder, ignored)) {

@@ -22,10 +22,13 @@ core::Result<Layout> read_stray(const fs::path& folder, const LayoutOptions& /*o
   if (!odometry) return tl::unexpected(odometry.error());
   for (const std::string& note : odometry->notes)
     log.warning(fmt::format("{}: {}", (folder / "odometry.csv").string(), note));
+
+  // Pairs need a frame of the film
   const std::string film = (folder / "rgb.mp4").string();
   const auto frames = VideoFrames(film).count();
   if (!frames) return tl::unexpected(frames.error());
 
+  // Colour is a film, depth a folder of images
   Layout layout;
   layout.format = "stray";
   const auto images = std::make_shared<FilmImages>(film);
@@ -33,6 +36,7 @@ core::Result<Layout> read_stray(const fs::path& folder, const LayoutOptions& /*o
   const fs::path confidence = folder / "confidence";
   if (is_folder(confidence)) layout.confidence = confidence.string();
 
+  // Depth's number is the row and the film's frame
   const auto rows = static_cast<long long>(odometry->rows.size());
   for (const auto& [number, file] : numbered_images(folder / "depth")) {
     if (number >= rows || number >= *frames) continue;
@@ -47,6 +51,7 @@ core::Result<Layout> read_stray(const fs::path& folder, const LayoutOptions& /*o
                     folder.string(), *frames, rows));
   }
 
+  // ARKit's poses are odometry, not ground truth
   layout.truth = std::move(odometry->poses);
   layout.truth_is_odometry = true;
   return layout;

@@ -27,6 +27,8 @@ std::optional<geometry::Rigid3> ned_pose(const TextLine& line) {
     if (!value || !std::isfinite(*value)) return std::nullopt;
     n[i] = *value;
   }
+
+  // A rotation is a unit quaternion up to rounding
   const Eigen::Quaterniond q(n[6], n[3], n[4], n[5]);
   if (std::abs(q.norm() - 1.0) > 0.01) return std::nullopt;
   return geometry::Rigid3(q, {n[0], n[1], n[2]});
@@ -83,6 +85,8 @@ core::Result<Layout> read_tartanair(const fs::path& folder, const LayoutOptions&
         fmt::format("{}: no number is in both image_left/ ({} images) and depth_left/ ({})", folder.string(),
                     color.size(), depth.size()));
   }
+
+  // The simulated camera is the same in all scenes
   layout.camera = tartanair_camera();
   geometry::Trajectory truth = tartanair_truth(folder / "pose_left.txt", options.fps, log);
   if (!truth.empty()) layout.truth = std::move(truth);

@@ -138,6 +138,7 @@ core::Result<Layout> read_associations(const fs::path& list, core::Log& log) {
                                            list.string(), line.number, line.words.size()));
     }
 
+    // Each image has a stamp before it
     const auto first = read_stamp(list.string(), line, 0);
     if (!first) return tl::unexpected(first.error());
     const auto second = read_stamp(list.string(), line, 2);
@@ -146,19 +147,22 @@ core::Result<Layout> read_associations(const fs::path& list, core::Log& log) {
     StampedFile a{*first, listed_file(list, line.words[1]), line.number};
     StampedFile b{*second, listed_file(list, line.words[3]), line.number};
     if (used.count(a.file) + used.count(b.file) > 0) continue;
-
     used.insert({a.file, b.file});
+
+    // Depth may be named before colour
     if (depth_first(line.words[1], line.words[3])) std::swap(a, b);
     color.push_back(std::move(a));
     depth.push_back(std::move(b));
   }
   if (color.empty()) return core::input_error(fmt::format("{}: names no pair of images", list.string()));
 
+  // Repeated images are reported
   if (color.size() < lines->size()) {
     log.warning(fmt::format("{}: {} of {} lines name an image a second time; not used", list.string(),
                             lines->size() - color.size(), lines->size()));
   }
 
+  // The files that are listed must exist
   for (const auto* files : {&color, &depth}) {
     if (auto there = check_files(list.string(), *files); !there) return tl::unexpected(there.error());
   }
@@ -169,6 +173,7 @@ core::Result<Layout> read_associations(const fs::path& list, core::Log& log) {
   for (std::size_t i = 0; i < color.size(); ++i)
     pairs.push_back({color[i].stamp, depth[i].stamp, {ImageList::kColor, i}, {ImageList::kDepth, i}});
 
+  // Tracking needs the stamps in order
   if (!std::is_sorted(pairs.begin(), pairs.end(), kByStamp)) {
     log.warning(fmt::format("{}: the stamps are not in order; sorted", list.string()));
     std::stable_sort(pairs.begin(), pairs.end(), kByStamp);
@@ -185,6 +190,8 @@ core::Result<Layout> read_tum(const fs::path& folder, const LayoutOptions& optio
   auto layout =
       is_file(associations) ? read_associations(associations, log) : read_two_lists(folder, options, log);
   if (!layout) return layout;
+
+  // A damaged truth does not prevent tracking
   if (is_file(folder / "groundtruth.txt")) {
     std::vector<std::string> notes;
     auto truth = read_trajectory(folder / "groundtruth.txt", &notes);

@@ -37,6 +37,8 @@ class FedImages final : public ImageSource {
     if (!bytes) return core::input_error(describe(id) + ": does not exist any more");
     const bool color = id.list == ImageList::kColor;
     const sensor::Pinhole& size = color ? color_ : depth_;
+
+    // A copy, because the stored bytes are shared
     cv::Mat image(size.height, size.width, color ? CV_8UC3 : CV_16UC1);
     std::copy(bytes->begin(), bytes->end(), image.data);
     return image;
@@ -64,6 +66,7 @@ core::Result<SharedBytes> checked_color(const cv::Mat& color, const sensor::Came
   return core::input_error("colour has neither one nor three channels of 8 bits");
 }
 
+/// Depth of the camera's size as 16 bits in its units.
 core::Result<SharedBytes> checked_depth(const cv::Mat& depth, const sensor::Camera& camera) {
   if (auto fits = check_size("depth", depth, depth_camera_of(camera)); !fits)
     return tl::unexpected(fits.error());
@@ -83,15 +86,19 @@ core::Result<LiveFrame> stored_frame(const FrameSource& source, std::size_t inde
   auto pair = source.stored(index);
   if (!pair) return tl::unexpected<core::Error>(pair.error());
 
+  // Stamps as measured, without the delay of depth
   LiveFrame frame;
   frame.stamp = info.stamp;
   frame.depth_stamp = info.depth_stamp - camera.depth_delay_s;
+
+  // The error names the stored image
   const sensor::Pinhole& depth_camera = camera.depth ? *camera.depth : camera.color;
   const std::string color = color_problem(pair->color.pixels, camera.color);
   if (!color.empty()) return core::input_error(pair->color.name + ": " + color);
   const std::string depth = depth_problem(pair->depth.pixels, depth_camera);
   if (!depth.empty()) return core::input_error(pair->depth.name + ": " + depth);
 
+  // Pixels in the types of a live camera
   frame.color = color_pixels(std::move(pair->color.pixels), camera.color);
   frame.depth = depth_pixels(std::move(pair->depth.pixels), camera.depth_scale);
   return frame;
@@ -117,7 +124,7 @@ core::Result<void> LiveFrames::push(const LiveFrame& frame) {
     return core::input_error(
         fmt::format("stamps are finite seconds, not {} and {}", frame.stamp, depth_stamp));
 
-  // A place in the queue, or a reason to have none.
+  // The frame gets a place in the queue, or is refused for a reason
   switch (live_->queue->push({frame.stamp, depth_stamp, *color, *depth, frame.odometry})) {
     case LiveQueue::Answer::kTaken:
       return {};

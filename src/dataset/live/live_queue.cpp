@@ -21,6 +21,7 @@ LiveQueue::Answer LiveQueue::push(LiveEntry entry) {
   if (!infos_.empty() && !is_later(entry.stamp, infos_.back().stamp)) return Answer::kBackwards;
   if (full()) return Answer::kFull;
 
+  // Colour and depth share the frame's number
   const std::size_t index = infos_.size();
   infos_.push_back({entry.stamp, entry.depth_stamp, {ImageList::kColor, index}, {ImageList::kDepth, index}});
   waiting_bytes_ += bytes_of(entry);
@@ -70,6 +71,7 @@ SharedBytes LiveQueue::image(ImageId id) const {
   const bool color = id.list == ImageList::kColor;
   if (const SharedBytes& bytes = color ? frame.entry.color : frame.entry.depth) return bytes;
 
+  // Kept frames stay readable after their release
   auto kept = kept_.get(*frame.kept + (color ? 0 : 1));
   return kept ? std::make_shared<const core::Bytes>(std::move(*kept)) : nullptr;
 }
@@ -105,6 +107,8 @@ LiveReport LiveQueue::report() const {
   const std::lock_guard lock(mutex_);
   LiveReport report;
   report.taken = infos_.size();
+
+  // Each kept frame has two images
   report.kept = kept_.count() / 2;
   report.kept_bytes = kept_.bytes();
   return report;
@@ -126,6 +130,8 @@ void LiveQueue::keep(std::size_t index) {
   const auto found = frames_.find(index);
   if (found == frames_.end() || found->second.kept) return;
   Frame& frame = found->second;
+
+  // Depth's number follows that of colour
   frame.kept = kept_.add(*frame.entry.color);
   kept_.add(*frame.entry.depth);
 }
@@ -135,6 +141,8 @@ void LiveQueue::release(std::size_t index) {
   stop_waiting(index);
   const auto found = frames_.find(index);
   if (found == frames_.end()) return;
+
+  // Kept frames lose only the raw images
   if (!found->second.kept) {
     frames_.erase(found);
     return;

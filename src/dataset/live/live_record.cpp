@@ -34,6 +34,7 @@ core::Result<void> LiveRecord::check(const std::filesystem::path& file, bool rep
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored)) return {};
 
+  // Only a file of the same kind may be replaced
   std::array<char, 5> magic{};
   std::ifstream(file, std::ios::binary).read(magic.data(), magic.size());
   if (magic != std::array<char, 5>{'\x89', 'M', 'C', 'A', 'P'}) {

@@ -28,7 +28,7 @@ class LiveSource final : public LiveFrameSource, public BodySource {
 
   [[nodiscard]] PairInfo info(std::size_t index) const override {
     PairInfo pair = queue_.info(index);
-    // One after another, as a recording's are: to the last digit.
+    // One by one as for recordings: the sum is the same to the last digit
     for (const double delay : delays_) pair.depth_stamp += delay;
     return pair;
   }
@@ -40,6 +40,8 @@ class LiveSource final : public LiveFrameSource, public BodySource {
     auto depth = read_depth(live_->layout, pair.depth, camera_.depth ? *camera_.depth : camera_.color,
                             camera_.depth_scale);
     if (!depth) return tl::unexpected(depth.error());
+
+    // Tracking uses the odometry of the same moment
     sensor::RgbdFrame frame = rectified_frame(index, pair, *color, *depth, rectifier_);
     frame.odometry = queue_.odometry(index);
     return frame;
@@ -66,6 +68,8 @@ class LiveSource final : public LiveFrameSource, public BodySource {
 
   [[nodiscard]] LiveReport report() const override {
     LiveReport report = live_->stream ? live_->stream->counts() : LiveReport();
+
+    // The stream counts losses, the queue taken frames
     const LiveReport taken = queue_.report();
     report.taken = taken.taken;
     report.kept = taken.kept;
@@ -80,6 +84,8 @@ class LiveSource final : public LiveFrameSource, public BodySource {
                                            double until) const override {
     if (!live_->stream) return {};
     BodyReadings readings = live_->stream->body_readings(imu_after, odometry_after, until);
+
+    // The mount belongs to the frame that odometry moves
     const auto known = live_->body_from_camera.find(live_->stream->body_frame());
     if (known != live_->body_from_camera.end()) readings.body_from_camera = known->second;
     return readings;

@@ -69,7 +69,7 @@ void LiveStream::leave_out(std::size_t LiveReport::*count, const std::string& wh
 }
 
 void LiveStream::number(const StampPairs::Pair& pair) {
-  // A number in the queue, or a reason to have none.
+  // The frame gets a number in the queue, or is left out for a reason
   const double stamp = seconds_of(pair.color.stamp_ns);
   switch (queue_->push({stamp, seconds_of(pair.depth.stamp_ns), pair.color.bytes, pair.depth.bytes})) {
     case LiveQueue::Answer::kTaken:
@@ -98,6 +98,7 @@ void LiveStream::number(const StampPairs::Pair& pair) {
   }
 }
 
+/// Takes messages until the first pair is complete; false if none came within `most`.
 bool LiveStream::wait_for_first(std::chrono::milliseconds most) {
   const auto until = SteadyClock::now() + most;
   while (queue_->size() == 0 && SteadyClock::now() < until && !options_.stop.stop_requested()) {
@@ -111,6 +112,8 @@ bool LiveStream::wait_for_first(std::chrono::milliseconds most) {
 
 void LiveStream::start(std::unique_ptr<LiveRecord> record) {
   record_ = std::move(record);
+
+  // The recording begins with the pairs already received
   if (record_ != nullptr) {
     for (const StampPairs::Pair& pair : to_record_) record_->add(pair);
   }
@@ -121,6 +124,8 @@ void LiveStream::start(std::unique_ptr<LiveRecord> record) {
 
 void LiveStream::tell_silence() {
   const bool silent = seconds_since(last_taken_) > kSilence_s;
+
+  // One warning for each silence
   if (silent && !told_silence_) {
     log_.warning(fmt::format("{}: no frame for {:g} s; waiting for the camera (Ctrl-C ends the run)",
                              options_.address, kSilence_s));
@@ -134,6 +139,7 @@ void LiveStream::work(const core::StopToken& enough) {
            seconds_since(first_taken_) > options_.for_s;
   };
 
+  // Short waits, so that silence is noticed
   while (!over()) {
     auto message = stream_->next(kWaitForMessage);
     if (message) {
@@ -143,7 +149,10 @@ void LiveStream::work(const core::StopToken& enough) {
     tell_silence();
   }
 
+  // Images that still wait for their pair
   while (const auto pair = pairs_.next(true)) number(*pair);
+
+  // Last counts before readers see the end
   std::unique_lock lock(mutex_);
   counts_.lost = stream_->lost();
   counts_.unpaired = pairs_.unpaired();

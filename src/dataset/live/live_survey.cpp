@@ -55,12 +55,14 @@ class StreamSurveyor {
   StreamSurveyor(const std::string& address, MessageStream& stream, const TopicNames& named,
                  const BagReaders& readers)
       : stream_(stream), named_(named), readers_(readers), bag_(std::make_shared<MemoryBag>()) {
+    // A stream is surveyed as a bag in memory
     found_.survey.path = address;
     found_.survey.kind = "ros2";
     found_.survey.files.push_back(bag_);
   }
 
   void listen() {
+    // Cameras may start during the survey
     const auto now = Clock::now();
     if (now - looked_ > kLookEvery) {
       looked_ = now;
@@ -68,6 +70,8 @@ class StreamSurveyor {
     }
     auto message = stream_.next(kListen);
     if (!message) return;
+
+    // Tracking begins with the messages of the survey
     LiveMessage kept{message->topic, message->received_ns,
                      std::make_shared<const Bytes>(std::move(message->bytes))};
     add(kept);
@@ -76,8 +80,7 @@ class StreamSurveyor {
     found_.images.push_back(std::move(kept));
   }
 
-  /// Colour and depth are chosen for certain, and what there is of their calibration has come. Looked at
-  /// from time to time.
+  /// True if colour and depth are certain and their calibration has arrived; tested from time to time.
   bool complete() {
     const auto now = Clock::now();
     if (found_.images.empty() || now - first_image_ < kOthersMayCome || now - judged_ < kLookEvery)
@@ -97,7 +100,7 @@ class StreamSurveyor {
     sort_topics();
     return std::move(found_);
   }
-  /// Keeps messages of these topics only, and of those that tell of the body, which it returns.
+  /// Keeps messages of these topics only, and of those about the body, which it returns.
   std::vector<BagTopic> keep_only(const std::set<std::string>& topics, bool with_body) {
     std::vector<BagTopic> body;
     for (const auto& [topic, type] : types_) {
@@ -115,6 +118,8 @@ class StreamSurveyor {
     if (!topic.supported) return false;
     if (topic.type == "tf2_msgs/TFMessage") return topic.name == "/tf_static" || topic.name == "/tf";
     if (topic.type == "sensor_msgs/CameraInfo" || tells_of_body({topic.name, topic.type, ""})) return true;
+
+    // Named topics make all other images superfluous
     const bool all = named_.color.empty() || named_.depth.empty();
     return is_image_type(topic.type) && (all || topic.name == named_.color || topic.name == named_.depth);
   }
@@ -136,6 +141,8 @@ class StreamSurveyor {
     const auto known = std::find_if(topics.begin(), topics.end(),
                                     [&](const SurveyedTopic& topic) { return topic.topic.name == name; });
     if (known != topics.end()) return *known;
+
+    // ROS 2 sends all messages as CDR
     SurveyedTopic added;
     added.topic = {name, types_[name], "cdr"};
     added.decoder = &readers_.cdr();
@@ -149,10 +156,14 @@ class StreamSurveyor {
     topic.first_ns = topic.count == 0 ? message.received_ns : topic.first_ns;
     topic.last_ns = message.received_ns;
     ++topic.count;
+
+    // A few messages without images are enough
     if (!topic.has_images()) {
       if (topic.others.size() < kFewMessages) topic.others.push_back(bag_->add(message.bytes));
       return;
     }
+
+    // The stamp is in the message's head
     const auto stamp =
         topic.decoder->stamp(message.bytes->data(), std::min(message.bytes->size(), kHeadBytes));
     if (stamp && topic.images.size() < kMostImages)
@@ -180,6 +191,8 @@ core::Result<LiveSurvey> no_camera(const std::string& address, const std::vector
                     "node runs",
                     address, seconds));
   }
+
+  // The user sees which topics exist
   std::string list;
   for (const StreamTopic& topic : topics)
     list += fmt::format("{}{} ({})", list.empty() ? "" : ", ", topic.name, topic.type);
@@ -191,6 +204,7 @@ core::Result<LiveSurvey> no_camera(const std::string& address, const std::vector
 
 }  // namespace
 
+/// One line for each topic, as in the summary of a bag.
 std::string published_text(const std::vector<StreamTopic>& topics) {
   std::string text;
   for (const StreamTopic& topic : topics) {
@@ -206,7 +220,7 @@ core::Result<LiveSurvey> survey_stream(const std::string& address, MessageStream
   const auto& readers = core::part<BagReaders>();
   if (!readers) return tl::unexpected(readers.error());
 
-  // Until it is certain which topics are the camera's.
+  // Messages until the camera's topics are certain
   StreamSurveyor surveyor(address, stream, named, **readers);
   const auto until = Clock::now() + patience;
   while (Clock::now() < until && !surveyor.complete()) {

@@ -54,6 +54,8 @@ core::Result<void> fits_live(const std::string& address, const OpenOptions& opti
                       : options.format != "auto" && !options.format.empty() ? "--format"
                       : options.poses == PoseUse::kGiven                    ? "--poses given"
                                                                             : nullptr;
+
+  // The file to record is checked before the run
   if (wrong == nullptr)
     return options.live.record.empty() ? core::Result<void>()
                                        : LiveRecord::check(options.live.record, options.live.replace);
@@ -61,7 +63,7 @@ core::Result<void> fits_live(const std::string& address, const OpenOptions& opti
       fmt::format("{}: is live; {} is about recordings (--for S ends the run)", address, wrong));
 }
 
-/// The messages that say what the cameras are.
+/// The messages with the calibrations of both cameras.
 LiveRecord::Infos infos_of(const BagSurvey& survey, const ChosenTopics& topics) {
   LiveRecord::Infos infos;
   const auto first = [&](const ChosenTopic& chosen) -> std::optional<CameraInfoMessage> {
@@ -190,7 +192,7 @@ core::Result<std::unique_ptr<LiveFrameSource>> open_live(const std::string& addr
   if (auto begun = begin(address, *found, *topics, options, *live); !begun)
     return tl::unexpected(begun.error());
 
-  // The first frames say the rest, as those of a recording do.
+  // The first frames complete and check the camera, as for recordings
   const auto camera = complete_live_camera(address, options, *chosen, *found, *topics, live->layout, log);
   if (!camera) return tl::unexpected(camera.error());
   if (auto likely = check_focal_lengths(*camera, address); !likely) return tl::unexpected(likely.error());
@@ -210,6 +212,8 @@ core::Result<std::string> live_to_text(const std::string& address, MessageStream
                                        const OpenOptions& options) {
   const auto found = survey_stream(address, stream, options.topics, options.live.patience, options.live.stop);
   std::string text = fmt::format("live: {}\n{}", address, published_text(stream.topics()));
+
+  // Topics without images help to find the error
   if (!found) {
     if (stream.topics().empty()) return tl::unexpected(found.error());
     return text + "note: " + found.error().message + "\n";

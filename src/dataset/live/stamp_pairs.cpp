@@ -54,16 +54,18 @@ std::optional<StampPairs::Pair> StampPairs::next(bool final) {
     const auto depth = nearest_depth(0);
     const bool same_moment = depth && gap(color_.front(), depth_[*depth]) == 0;
     const bool depth_certain = final || same_moment || (!depth_.empty() && depth_.back().stamp_ns >= when);
+
+    // Nearer depth may still arrive
     if (!depth_certain) return std::nullopt;
     if (!depth) {
-      // Nothing near it has come, and nothing can.
+      // No depth near it has arrived, and none can
       if (!final && depth_.back().stamp_ns < when + reach_us_ * kMicrosecond_ns) return std::nullopt;
       color_.pop_front();
       ++unpaired_;
       continue;
     }
 
-    // Depth after colour may belong to the next colour, which has to be seen.
+    // Depth after colour may belong to the next colour, which must arrive first
     const std::int64_t depth_when = depth_[*depth].stamp_ns + delay_ns_;
     const bool color_certain = final || same_moment || color_.back().stamp_ns >= depth_when;
     if (!color_certain) return std::nullopt;

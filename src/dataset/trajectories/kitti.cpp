@@ -31,6 +31,8 @@ bool is_kitti(const TrajectoryText& text) {
     if (row.words.size() != 12 && row.words.size() != 16) return false;
     const auto n = text.numbers(row);
     if (!n) return false;
+
+    // Lost poses tell nothing about the format
     if (!all_finite(*n)) continue;
     if (n->size() == 16 && ((*n)[12] != 0.0 || (*n)[13] != 0.0 || (*n)[14] != 0.0 || (*n)[15] != 1.0))
       return false;
@@ -44,6 +46,8 @@ core::Result<PoseOfRow> read_kitti(const TrajectoryText& text, const TextLine& r
     return text.wrong(row.number, "expected 12 numbers, as in the rows above");
   const auto n = text.numbers(row);
   if (!n) return tl::unexpected(n.error());
+
+  // A lost pose keeps its row number
   if (!all_finite(*n)) return PoseOfRow();
   const Eigen::Matrix<double, 3, 4> m = matrix_of(*n);
   if (!is_rotation(m.leftCols<3>())) return text.wrong(row.number, "the matrix is not a rotation");

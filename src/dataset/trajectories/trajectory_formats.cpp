@@ -80,8 +80,9 @@ core::Result<TrajectoryText> read_text(const std::filesystem::path& file,
       if (header) text.header = header;
       if (header && words.front().front() != '#') continue;
     }
-
     if (words.front().front() == '#') continue;
+
+    // Decimal commas would be read as separators
     if (core::has_decimal_comma(split_words(line.text, " \t\r\n;\v\f")) || eight_cut_in_two(words))
       return text.wrong(line.number, "decimal comma; write numbers with a point");
     if (text.rows.empty()) text.commas = line.text.find(',') != std::string::npos;
@@ -135,6 +136,7 @@ tl::unexpected<core::Error> TrajectoryText::wrong(int line, const std::string& w
   return core::input_error(fmt::format("{}:{}: {}", file, line, what));
 }
 
+/// All words of a row as numbers.
 core::Result<std::vector<double>> TrajectoryText::numbers(const TextLine& row) const {
   std::vector<double> numbers;
   for (const std::string& word : row.words) {
@@ -162,9 +164,11 @@ core::Result<PoseOfRow> read_columns(const TrajectoryText& text, const TextLine&
     n[i] = *value;
   }
 
+  // Values that are not finite mark a lost pose
   stamp = n[0] / units_per_second(text);
   if (!std::all_of(n.begin(), n.end(), [](double v) { return std::isfinite(v); })) return PoseOfRow();
 
+  // Rounded quaternions are normalised; zero has no direction
   const Eigen::Quaterniond q(n[7], n[4], n[5], n[6]);
   if (q.norm() < kMinQuaternionNorm) return text.wrong(row.number, "the quaternion is zero");
   if (!std::isfinite(q.norm())) return text.wrong(row.number, "the quaternion is too large to be one");
@@ -181,6 +185,7 @@ core::Result<TrajectoryReading> read_trajectory_file(const std::filesystem::path
   reading.format = format.name;
   reading.stamped = format.stamped;
 
+  // Rows without stamps are numbered
   for (const TextLine& row : text->rows) {
     auto stamp = static_cast<double>(reading.rows.size());
     const auto pose = format.read_row(*text, row, stamp);
@@ -189,6 +194,7 @@ core::Result<TrajectoryReading> read_trajectory_file(const std::filesystem::path
     if (*pose) reading.poses.push_back({stamp, (*pose)->world_from_camera});
   }
 
+  // Lost poses are left out and counted
   const std::size_t left_out = reading.rows.size() - reading.poses.size();
   if (left_out > 0 && reading.poses.empty())
     return text->wrong(text->rows.front().number, "no row is finite: there is no pose");
@@ -198,6 +204,7 @@ core::Result<TrajectoryReading> read_trajectory_file(const std::filesystem::path
                                         left_out, reading.rows.size()));
   }
 
+  // Rows may be in any order
   std::stable_sort(reading.poses.begin(), reading.poses.end(), kByStamp);
   note_shared_stamps(reading);
   return reading;
@@ -207,6 +214,8 @@ core::Result<geometry::Trajectory> read_trajectory(const std::filesystem::path& 
                                                    std::vector<std::string>* notes) {
   auto reading = read_trajectory_file(file);
   if (!reading) return tl::unexpected(reading.error());
+
+  // Row numbers are not times
   if (!reading->stamped) {
     return core::input_error(fmt::format(
         "{}: holds matrices without stamps, as KITTI's; 'stamp tx ty tz qx qy qz qw' is needed here",
@@ -223,6 +232,8 @@ bool holds_poses(const std::filesystem::path& file) {
   const auto text = read_text(file, kLooksAt);
   if (!text || text->rows.empty()) return false;
   if (text->header || kKittiTrajectory.recognises(*text)) return true;
+
+  // Four of eight numbers form a unit quaternion
   const auto n = text->numbers(text->rows.front());
   if (!n || n->size() != kColumns) return false;
   return std::abs(std::hypot(std::hypot((*n)[4], (*n)[5], (*n)[6]), (*n)[7]) - 1.0) < 1e-3;
@@ -230,6 +241,8 @@ bool holds_poses(const std::filesystem::path& file) {
 
 core::Result<void> pair_by_number(TrajectoryReading& estimate, TrajectoryReading& truth) {
   if (estimate.stamped && truth.stamped) return {};
+
+  // Pairing by number needs equal counts
   if (estimate.rows.size() != truth.rows.size()) {
     return core::input_error(fmt::format(
         "there are no stamps in {}, and the counts differ ({} poses, {} in the truth): they cannot be "
@@ -237,19 +250,22 @@ core::Result<void> pair_by_number(TrajectoryReading& estimate, TrajectoryReading
         estimate.stamped ? "the truth" : "the estimate", estimate.rows.size(), truth.rows.size()));
   }
 
+  // Row numbers become the other file's stamps
   constexpr double kittis_step_s = 0.1;
-
   const auto restamp = [&](TrajectoryReading& reading, const TrajectoryReading& other) {
     for (geometry::StampedPose& pose : reading.poses) {
       pose.stamp =
           other.stamped ? other.rows[static_cast<std::size_t>(pose.stamp)] : kittis_step_s * pose.stamp;
     }
+
+    // Rows without a finite stamp are left out
     auto& poses = reading.poses;
     const auto lost = [](const geometry::StampedPose& pose) { return !std::isfinite(pose.stamp); };
     poses.erase(std::remove_if(poses.begin(), poses.end(), lost), poses.end());
     std::stable_sort(poses.begin(), poses.end(), kByStamp);
   };
 
+  // The numbers are lost once the truth has stamps
   const TrajectoryReading unstamped_truth = truth;
   if (!truth.stamped) restamp(truth, estimate);
   if (!estimate.stamped) restamp(estimate, unstamped_truth);

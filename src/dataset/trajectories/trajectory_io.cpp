@@ -11,6 +11,7 @@
 namespace plumbline::dataset {
 namespace {
 
+/// TUM's format, rounded to microseconds and nanometres.
 std::string to_text(const geometry::Trajectory& trajectory) {
   std::string text = "# timestamp tx ty tz qx qy qz qw\n";
   for (const geometry::StampedPose& pose : trajectory) {

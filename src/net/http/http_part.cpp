@@ -59,6 +59,8 @@ class Tasks : public httplib::TaskQueue {
         return;
       }
     }
+
+    // Requests beyond the limit are refused, not queued
     refusing = true;
     task();
     refusing = false;
@@ -69,6 +71,8 @@ class Tasks : public httplib::TaskQueue {
       const std::lock_guard lock(mutex_);
       stopped_ = true;
     }
+
+    // Waiting requests are still answered
     wake_.notify_all();
     for (std::thread& thread : threads_) thread.join();
   }
@@ -82,6 +86,8 @@ class Tasks : public httplib::TaskQueue {
       const std::function<void()> task = std::move(waiting_.front());
       waiting_.pop_front();
       ++busy_;
+
+      // Others may enqueue during the task
       lock.unlock();
       task();
       lock.lock();
@@ -174,7 +180,7 @@ struct Running {
   std::thread thread;
 };
 
-/// Compares in a time that does not depend on how much is right.
+/// Compares in a time that does not depend on the number of equal characters.
 bool same_secret(const std::string& given, const std::string& right) {
   unsigned char differs = given.size() == right.size() ? 0 : 1;
   for (std::size_t i = 0; i < right.size(); ++i)
@@ -197,7 +203,7 @@ bool own_name(const Running& running, const std::string& host) {
          ::inet_pton(AF_INET6, address.c_str(), &number) == 1;
 }
 
-/// Status of a request that is refused; 0: it is not.
+/// Status of a request that is refused; 0 if it is allowed.
 int refused(const Running& running, const httplib::Request& request) {
   const std::string scheme = "http://";
   if (request.get_header_value_count("Host") > 1) return 400;
@@ -230,6 +236,7 @@ bool stream_events(Events& events, Listener& listener, httplib::DataSink& sink) 
 void answer_events(Events& events, httplib::Response& response) {
   std::list<Listener>::iterator listener;
   {
+    // Each stream occupies a thread
     const std::lock_guard lock(events.mutex);
     if (events.listeners.size() >= Limits::kStreams || events.ended) {
       response.status = 503;
@@ -237,11 +244,13 @@ void answer_events(Events& events, httplib::Response& response) {
       return;
     }
 
+    // A new listener gets the latest events first
     listener = events.listeners.emplace(events.listeners.end());
     listener->most += events.kept.size();
     for (const auto& [topic, event] : events.kept) put(*listener, event);
   }
 
+  // Events follow until the listener leaves
   response.set_header("Cache-Control", "no-store");
   response.set_chunked_content_provider(
       "text/event-stream",
@@ -255,6 +264,7 @@ void answer_events(Events& events, httplib::Response& response) {
 }
 
 void set_routes(Running& running) {
+  // The page loads nothing from other hosts
   running.server.set_default_headers(
       {{"X-Content-Type-Options", "nosniff"},
        {"Referrer-Policy", "no-referrer"},
@@ -262,6 +272,7 @@ void set_routes(Running& running) {
         "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; "
         "connect-src 'self'; frame-ancestors 'none'"}});
 
+  // Token and host are checked before any route
   running.server.set_pre_routing_handler(
       [&running](const httplib::Request& request, httplib::Response& response) {
         const int status = refused(running, request);
@@ -274,6 +285,7 @@ void set_routes(Running& running) {
         return httplib::Server::HandlerResponse::Handled;
       });
 
+  // The page is streamed without a copy
   running.server.Get("/", [&running](const httplib::Request& /*request*/, httplib::Response& response) {
     response.set_content_provider(
         running.page.size(), "text/html; charset=utf-8",
@@ -282,6 +294,7 @@ void set_routes(Running& running) {
         });
   });
 
+  // Each listener's answer stays open
   running.server.Get("/events", [&running](const httplib::Request& /*request*/, httplib::Response& response) {
     answer_events(running.events, response);
   });
@@ -333,6 +346,8 @@ void send(void* server, const std::string& json, const std::string& topic) {
   const std::string event = as_event(json);
   {
     const std::lock_guard lock(events.mutex);
+
+    // New listeners get the latest of each topic
     if (!topic.empty()) events.kept[topic] = event;
     for (Listener& listener : events.listeners) put(listener, event);
   }
@@ -341,6 +356,8 @@ void send(void* server, const std::string& json, const std::string& topic) {
 
 void stop(void* server) {
   const std::unique_ptr<Running> running(static_cast<Running*>(server));
+
+  // Open streams would keep the server running
   {
     const std::lock_guard lock(running->events.mutex);
     running->events.ended = true;

@@ -83,7 +83,7 @@ std::vector<fs::path> stores_in(const fs::path& folder) {
   return stores;
 }
 
-/// True if a store is a robot's own map beside the map of all: OUT/robots/NAME/map.db.
+/// True if a store is the map of one robot, not the common map: OUT/robots/NAME/map.db.
 bool is_of_one_robot(const fs::path& store) {
   return store.parent_path().parent_path().filename() == "robots";
 }
@@ -134,8 +134,7 @@ void LiveMap::Impl::show(const maps::StoreReader& reader, const maps::StoredMap&
     const auto robot = names.find(keyframe.id.robot);
     if (robot == names.end() || there.count(keyframe.id) == 0) continue;
 
-    // The name is the same in a robot's own map and in the map of all, whose clouds so replace the earlier
-    // ones.
+    // The name is the same in a robot's own map and in the common map, whose clouds replace the earlier ones
     const std::string name = robot->second + "/" + std::to_string(keyframe.id.index);
     const geometry::Rigid3 pose = shared_from_map * keyframe.world_from_camera;
     const auto before = sent.find(name);
@@ -161,7 +160,7 @@ void LiveMap::Impl::look_at(const fs::path& store, Json& robots) {
   const auto each = reader->load_each();
   if (!each) return;
 
-  // A hub's copy is known by its folder, and lies where the hub's meetings have put it.
+  // A hub's copy is known by its folder and placed by the hub's meetings
   const std::string folder = store.parent_path().filename().string();
   const bool copy = is_of_one_robot(store);
   geometry::Rigid3 shared_from_map;
@@ -205,7 +204,7 @@ void LiveMap::Impl::look() {
   if (!fs::exists(folder, ec)) folder = output;
   Json robots = Json::array();
 
-  // Where there is a map of all, finished or not, it stands for the robots' own ones.
+  // A common map, finished or not, replaces the robots' own maps
   const std::vector<fs::path> stores = stores_in(folder);
   for (const bool own : {false, true}) {
     if (!robots.empty()) break;
@@ -239,7 +238,7 @@ void LiveMap::Impl::follow() {
     look();
     const Clock::duration took = processor_time() - before;
     lock.lock();
-    // It takes a tenth of a processor at most. Time for which it waited for one does not count.
+    // At most a tenth of a processor; time of waiting for one does not count
     wake.wait_for(lock, std::max<Clock::duration>(std::chrono::seconds(1), 10 * took), [&] { return ended; });
   }
 }
@@ -251,6 +250,8 @@ void LiveMap::Impl::end() {
   }
   wake.notify_all();
   thread.join();
+
+  // The last clouds are sent without a limit
   at_once = std::numeric_limits<std::size_t>::max();
   look();
   server.send(R"({"done":true})", "done");
@@ -272,6 +273,8 @@ core::Result<std::unique_ptr<LiveMap>> LiveMap::start(const PageServerOptions& o
   std::unique_ptr<LiveMap> live(new LiveMap);
   live->impl_ = std::make_unique<Impl>(std::move(*server));
   live->impl_->output = output;
+
+  // The thread reads the members set above
   live->impl_->thread = std::thread([impl = live->impl_.get()] { impl->follow(); });
   return live;
 }

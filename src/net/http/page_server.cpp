@@ -24,7 +24,7 @@ bool all_digits(const std::string& text) {
          std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
 }
 
-/// 0, or why the system does not let a server have the address.
+/// The error with which the system refuses the address to a server; 0: none.
 int bind_problem(const addrinfo& address) {
   const int descriptor = ::socket(address.ai_family, address.ai_socktype | SOCK_CLOEXEC, address.ai_protocol);
   if (descriptor < 0) return errno;
@@ -88,10 +88,14 @@ Addresses addresses_of(const PageServerOptions& options) {
 core::Result<PageServerOptions> page_server_options(const std::string& address, const std::string& token) {
   PageServerOptions options;
   options.token = token;
+
+  // IPv6 addresses stand in brackets
   const std::size_t bracket = address.rfind(']');
   const std::size_t colon = address.find(':', bracket == std::string::npos ? 0 : bracket);
   std::string host = address.substr(0, colon);
   std::string port = colon == std::string::npos ? std::string() : address.substr(colon + 1);
+
+  // Digits alone are a port
   if (colon == std::string::npos && all_digits(address)) std::swap(host, port);
   if (bracket != std::string::npos && host.size() > 2) host = host.substr(1, host.size() - 2);
 
@@ -111,6 +115,7 @@ core::Result<void> check_listening(const PageServerOptions& options) {
                     options.host, options.port));
   }
 
+  // One address that can be bound is enough
   int problem = 0;
   for (const addrinfo* address = found.get(); address != nullptr; address = address->ai_next) {
     problem = bind_problem(*address);
@@ -124,6 +129,8 @@ core::Result<void> check_listening(const PageServerOptions& options) {
 std::string open_to_others(const PageServerOptions& options) {
   if (!options.token.empty()) return {};
   const Addresses found = addresses_of(options);
+
+  // Loopback addresses are reached only from this machine
   for (const addrinfo* address = found.get(); address != nullptr; address = address->ai_next) {
     if (is_loopback(*address)) continue;
     return fmt::format(
@@ -134,6 +141,7 @@ std::string open_to_others(const PageServerOptions& options) {
 }
 
 core::Result<PageServer> PageServer::start(const PageServerOptions& options, std::string page) {
+  // A checked port gives a clearer message
   if (auto free = check_listening(options); !free) return tl::unexpected(free.error());
   const auto& http = core::part<HttpFunctions>();
   if (!http) return tl::unexpected(http.error());

@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kBearings = 720;    // of a turn
 constexpr int kBlock = 64;        // the grid grows by blocks of cells
-constexpr double kFloor_m = 0.1;  // how far measured floor lies from z = 0
+constexpr double kFloor_m = 0.1;  // greatest distance of measured floor from z = 0
 constexpr int kFewestPoints = 2;  // of an obstacle in one cell of a beam
 constexpr double kBody_m = 0.2;   // whoever carries the camera stands on free ground
 constexpr double kPi = 3.14159265358979323846;
@@ -30,6 +30,7 @@ void LiveGrid::add(double stamp, const geometry::Rigid3& map_from_camera,
   scan.yaw = yaw_of(map_from_camera);
   scan.beams = beams_of(scan, points);
 
+  // A scan of that time is already drawn
   const auto [at, is_new] = scans_.emplace(stamp, std::move(scan));
   if (!is_new) return;
   make_room(at->second);
@@ -44,10 +45,13 @@ void LiveGrid::move(const geometry::Trajectory& map_from_camera) {
     Scan& scan = found->second;
     const Eigen::Vector2d at = pose.world_from_camera.translation.head<2>();
     const double yaw = yaw_of(pose.world_from_camera);
+
+    // Small corrections do not change cells
     if ((at - scan.at).norm() < 0.5 * options_.resolution_m &&
         std::abs(turn_between(yaw, scan.yaw)) < kLeastTurn)
       continue;
 
+    // Cells forget the scan at its old place
     draw(scan, -1);
     scan.at = at;
     scan.yaw = yaw;
@@ -61,7 +65,7 @@ std::optional<LiveGrid::Change> LiveGrid::take() {
   std::vector<std::uint8_t> now(cells_.size());
   for (std::size_t i = 0; i < now.size(); ++i) now[i] = value(i);
 
-  // All cells that were sent since the last whole grid: who has that and the latest part has everything
+  // All cells sent since the last whole grid: that and the latest part are complete
   const bool resized = sent_.size() != now.size();
   bool changed = resized;
   for (std::size_t i = 0; !resized && i < now.size(); ++i) {
@@ -220,7 +224,7 @@ void LiveGrid::make_room(const Scan& scan) {
   size_ = size;
 }
 
-/// Something that was there and is not any more is free once three times as many scans saw through it.
+/// A removed obstacle is free once three times as many scans saw through it.
 std::uint8_t LiveGrid::value(std::size_t cell) const {
   constexpr std::uint8_t kFree = 0;
   constexpr std::uint8_t kOccupied = 100;

@@ -23,6 +23,8 @@ Outgoing::~Outgoing() {
     const std::lock_guard lock(mutex_);
     closed_ = true;
   }
+
+  // Waiting messages are still sent
   changed_.notify_all();
   thread_.reset();
   sink_->flush(kLastWords);
@@ -33,6 +35,8 @@ Outgoing::~Outgoing() {
 void Outgoing::post(Message message) {
   {
     const std::lock_guard lock(mutex_);
+
+    // Slow subscribers must not use up memory
     if (waiting_.size() >= kMostWaiting && !message.must_go) {
       ++left_out_;
       return;
@@ -42,6 +46,7 @@ void Outgoing::post(Message message) {
   changed_.notify_all();
 }
 
+/// Waits for the next message; none once closed and empty.
 std::optional<Outgoing::Message> Outgoing::next() {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [this] { return closed_ || !waiting_.empty(); });
@@ -53,6 +58,8 @@ std::optional<Outgoing::Message> Outgoing::next() {
 
 void Outgoing::send(const Message& message) {
   core::Result<void> sent;
+
+  // Topics appear with their first message
   if (announced_.count(message.topic) == 0) {
     sent = sink_->announce(message.topic, message.type, dataset::Retention::kLatest);
     if (sent) announced_.insert(message.topic);
@@ -61,6 +68,8 @@ void Outgoing::send(const Message& message) {
     const auto bytes = message.bytes();
     sent = bytes ? sink_->send(message.topic, *bytes) : tl::unexpected(bytes.error());
   }
+
+  // One warning for all messages
   if (sent || std::exchange(told_problem_, true)) return;
   log_.warning(fmt::format("the map is not published: {}", sent.error().message));
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Messages on their way to a sink, sent by a thread of its own.
+// Messages on their way to a sink, sent by a separate thread.
 #include <condition_variable>
 #include <deque>
 #include <functional>

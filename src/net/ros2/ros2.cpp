@@ -35,6 +35,7 @@ std::string take(const std::string& setting, Ros2Address& into) {
   const std::string name = setting.substr(0, equals);
   const std::string value = setting.substr(equals + 1);
 
+  // Settings of the network
   if (name == "interface") {
     into.network.interface = value;
     return "";
@@ -44,12 +45,12 @@ std::string take(const std::string& setting, Ros2Address& into) {
     return "";
   }
 
+  // All other settings name a topic
   std::string* topic = name == "color"        ? &into.topics.color
                        : name == "depth"      ? &into.topics.depth
                        : name == "info"       ? &into.topics.info
                        : name == "depth_info" ? &into.topics.depth_info
                                               : nullptr;
-
   if (topic == nullptr) return fmt::format("'{}' is not a setting of an address", name);
   *topic = value.front() == '/' ? value : "/" + value;
   return "";
@@ -62,10 +63,12 @@ core::Result<Ros2Address> parse_ros2_address(const std::string& address) {
   if (address.compare(0, scheme.size(), scheme) != 0)
     return tl::unexpected(wrong(address, "is not an address of ROS 2"));
 
+  // Settings follow a question mark
   const std::size_t question = address.find('?');
   const std::string domain = address.substr(
       scheme.size(), question == std::string::npos ? std::string::npos : question - scheme.size());
 
+  // Only a whole number is a domain
   Ros2Address parsed;
   const char* end = domain.data() + domain.size();
   const auto [stop, error] = std::from_chars(domain.data(), end, parsed.network.domain);
@@ -102,6 +105,8 @@ core::Result<std::unique_ptr<dataset::MessageStream>> open_live_stream(const std
                                                                        dataset::TopicNames& topics) {
   const auto parsed = parse_ros2_address(address);
   if (!parsed) return tl::unexpected(parsed.error());
+
+  // Topics of the address replace given ones
   const std::pair<const std::string&, std::string&> names[] = {
       {parsed->topics.color, topics.color},
       {parsed->topics.depth, topics.depth},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A run on ROS 2's network: where the camera is, its path, and points.
+// Publishes a run on ROS 2's network: pose of the camera, its path, and points.
 #include <fmt/format.h>
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
@@ -31,7 +31,7 @@ constexpr const char* kGrid = "nav_msgs/OccupancyGrid";
 constexpr const char* kGridUpdate = "map_msgs/OccupancyGridUpdate";
 constexpr const char* kPose = "geometry_msgs/PoseWithCovarianceStamped";
 
-/// A camera looks along z and has x to its right; ROS' bodies look along x and have z above them.
+/// A camera's z points forward and its x to the right; of ROS's bodies x points forward and z up.
 Rigid3 body_from_optical() {
   Eigen::Matrix3d rotation;
   rotation << 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0;
@@ -114,6 +114,8 @@ class Ros2Publisher final : public pipeline::RunObserver {
                const Rigid3& odometry_from_camera) override {
     const Rigid3 map_from_body = published_from_map_ * map_from_camera * body_of_camera().inverse();
     Rigid3 odometry_from_body = published_from_map_ * odometry_from_camera * body_of_camera().inverse();
+
+    // Two publishers of one transform would conflict
     const bool other = another_publishes();
     if (other) {
       const auto theirs = others_->base_at(stamp);
@@ -121,18 +123,21 @@ class Ros2Publisher final : public pipeline::RunObserver {
       odometry_from_body = *theirs;
     }
 
+    // Drift is corrected between map and odom
     const Rigid3 map_from_odometry = map_from_body * odometry_from_body.inverse();
     std::vector<dataset::NamedTransform> transforms = {
         {frame(robot, frames_.map), frame(robot, frames_.odom), map_from_odometry}};
     if (!other)
       transforms.push_back({frame(robot, frames_.odom), frame(robot, body_name()), odometry_from_body});
+
+    // The listener ignores this program's transforms
     if (others_ != nullptr && !other) others_->sends(stamp);
     post_transforms(std::move(transforms), stamp);
 
     note_correction(robot, map_from_odometry);
   }
 
-  /// A frame without a pose: the correction stays as it was. One that was located tells how well.
+  /// A frame without a pose repeats the last correction; a located frame is sent with its accuracy.
   void processed(const pipeline::LivePose& pose) override {
     if (robots_.size() != 1) return;
     if (pose.world_from_camera) {
@@ -149,6 +154,7 @@ class Ros2Publisher final : public pipeline::RunObserver {
     post_path(robot, path, published_from_map_, false);
     if (frames_.base.empty()) return;
 
+    // Corrected poses move earlier scans
     const std::lock_guard lock(mutex_);
     LiveGrid& grid = grid_of(robot);
     grid.move(moved(path, published_from_map_));
@@ -157,12 +163,12 @@ class Ros2Publisher final : public pipeline::RunObserver {
 
   void added(std::int32_t robot, double stamp, const Rigid3& map_from_cloud,
              const cloud::Cloud& cloud) override {
-    // The cloud goes on to others: what is sent is made of it now.
+    // Packed at once, because the cloud is only borrowed
     post_points(topic(robot, "points"), frame(robot, frames_.map), stamp,
                 packed(cloud, published_from_map_ * map_from_cloud), false);
     if (frames_.base.empty()) return;
 
-    // Without a base nobody knows where the floor is.
+    // The base tells the height of the floor
     const Rigid3 published_from_cloud = published_from_map_ * map_from_cloud;
     const std::vector<Eigen::Vector3f> points = thinned(cloud, published_from_cloud);
     const std::lock_guard lock(mutex_);
@@ -179,6 +185,8 @@ class Ros2Publisher final : public pipeline::RunObserver {
       stamp = std::max(stamp, paths[r].back().stamp);
       post_path(static_cast<std::int32_t>(r), paths[r], published_from_map_, true);
     }
+
+    // The final cloud belongs to all robots
     post_points(shared_topic("map"), shared_frame(), stamp,
                 packed(cloud, published_from_map_ * map_from_cloud), true);
   }
@@ -201,10 +209,10 @@ class Ros2Publisher final : public pipeline::RunObserver {
     if (!frames_.base.empty()) return frames_.base;
     return frames_.camera.empty() ? "camera" : frames_.camera;
   }
-  /// Without a base, the lowest frame is the camera's, whose axes are its own.
+  /// Without a base, the lowest frame is the camera itself.
   [[nodiscard]] Rigid3 body_of_camera() const { return frames_.base.empty() ? Rigid3() : body_; }
 
-  /// True if the pose of the base comes from somebody else; says so when that begins.
+  /// True if another program publishes the pose of the base; logged when that begins.
   [[nodiscard]] bool another_publishes() {
     if (others_ == nullptr || frames_.odom_tf == OdomTf::kOwn) return false;
     const std::string parent = others_->other_parent();
@@ -230,7 +238,7 @@ class Ros2Publisher final : public pipeline::RunObserver {
     return !several(robots_.size()) ? frame(0, frames_.map) : "map";
   }
 
-  /// Keeps a robot's correction, and tells of a jump.
+  /// Keeps a robot's correction, and reports a jump.
   void note_correction(std::int32_t robot, const Rigid3& map_from_odometry) {
     constexpr double kJump_m = 0.05;
     constexpr double kJump_rad = 0.035;
@@ -259,7 +267,7 @@ class Ros2Publisher final : public pipeline::RunObserver {
     return grids_.try_emplace(robot, options).first->second;
   }
 
-  /// A whole grid, then parts that differ from it, so that who subscribes late gets both.
+  /// A whole grid, then parts that differ from it, so that late subscribers get both.
   void post_grid(std::int32_t robot, double stamp, LiveGrid& grid) {
     auto change = grid.take();
     if (!change) return;
@@ -321,7 +329,7 @@ class Ros2Publisher final : public pipeline::RunObserver {
   Outgoing outgoing_;
 };
 
-/// base_from_camera by /tf_static, and somebody else's pose of the base if it is waited for.
+/// base_from_camera by /tf_static; waits a moment for another program's pose of the base, too.
 core::Result<Rigid3> mounted(const PublishedFrames& frames, const TransformListener& others, core::Log& log) {
   constexpr std::chrono::seconds kStatic(5), kOthers(2);
   const auto begin = std::chrono::steady_clock::now();
@@ -358,6 +366,8 @@ core::Result<PublishedFrames> parse_published_frames(const std::string& text) {
     const std::size_t equals = word.find('=');
     const std::string key = word.substr(0, equals);
     const auto found = names.find(key);
+
+    // Misspelt and repeated names are refused
     if (equals == std::string::npos || equals + 1 == word.size() || found == names.end() ||
         !seen.insert(key).second) {
       return core::usage_error(
@@ -376,6 +386,8 @@ core::Result<std::shared_ptr<pipeline::RunObserver>> open_ros2_publisher(const s
                                                                          core::Log& log) {
   const auto parsed = parse_ros2_address(address);
   if (!parsed) return tl::unexpected(parsed.error());
+
+  // Published topics have fixed names
   if (parsed->topics.any()) {
     return core::usage_error(
         fmt::format("--publish {}: topics are not named here; they are /plumbline/path and others", address));
@@ -383,11 +395,14 @@ core::Result<std::shared_ptr<pipeline::RunObserver>> open_ros2_publisher(const s
   auto sink = open_ros2_sink(*parsed);
   if (!sink) return tl::unexpected(sink.error());
 
+  // Without a base the camera is the body
   PublishedFrames named = frames;
   Rigid3 body = body_from_optical();
   std::unique_ptr<TransformListener> others;
   if (!named.base.empty()) {
     if (named.camera.empty()) named.camera = "camera_color_optical_frame";
+
+    // Other programs publish the camera's mount
     auto stream = open_ros2_stream(*parsed);
     if (!stream) return tl::unexpected(stream.error());
     others = std::make_unique<TransformListener>(std::move(*stream), named.base);

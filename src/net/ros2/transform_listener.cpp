@@ -30,6 +30,7 @@ TransformListener::TransformListener(std::unique_ptr<dataset::MessageStream> str
 void TransformListener::listen(const core::StopToken& stop) {
   std::set<std::string> subscribed;
   while (!stop.stop_requested()) {
+    // Publishers may start at any time
     for (const dataset::StreamTopic& topic : stream_->topics()) {
       const bool transforms = topic.name == "/tf" || topic.name == "/tf_static";
       if (transforms && topic.supported && subscribed.count(topic.name) == 0 &&
@@ -50,9 +51,12 @@ void TransformListener::take(const dataset::StreamMessage& message) {
       fixed_[transform.child] = transform;
       continue;
     }
+
+    // Only others' poses of the base count
     if (transform.child != base_) continue;
     if (std::find(own_ns_.begin(), own_ns_.end(), nanoseconds(stamp)) != own_ns_.end()) continue;
 
+    // Another parent frame has another origin
     if (transform.parent != parent_) moving_.clear();
     parent_ = transform.parent;
     moving_[stamp] = transform.parent_from_child;
@@ -63,6 +67,8 @@ void TransformListener::take(const dataset::StreamMessage& message) {
 std::optional<Rigid3> TransformListener::fixed(const std::string& parent, const std::string& child) const {
   Rigid3 frame_from_child;
   std::string frame = child;
+
+  // A chain longer than all frames is a cycle
   for (std::size_t step = 0; frame != parent; ++step) {
     const auto found = fixed_.find(frame);
     if (found == fixed_.end() || step > fixed_.size()) return std::nullopt;
@@ -76,6 +82,7 @@ std::optional<Rigid3> TransformListener::wait_for(const std::string& parent, con
                                                   milliseconds most) const {
   const auto end = std::chrono::steady_clock::now() + most;
   while (true) {
+    // The lock is free between attempts
     {
       const std::lock_guard lock(mutex_);
       if (auto found = fixed(parent, child)) return found;
@@ -93,12 +100,15 @@ std::string TransformListener::other_parent() const {
 std::optional<Rigid3> TransformListener::base_at(double stamp) const {
   const std::lock_guard lock(mutex_);
   const auto after = moving_.lower_bound(stamp);
+
+  // Poses are interpolated between neighbours in time
   if (after != moving_.end() && after != moving_.begin()) {
     const auto& [t0, from] = *std::prev(after);
     const auto& [t1, to] = *after;
     return geometry::interpolate(from, to, (stamp - t0) / (t1 - t0));
   }
 
+  // At the ends the nearest pose must be near
   if (moving_.empty()) return std::nullopt;
   const auto& [nearest, pose] = after == moving_.end() ? *moving_.rbegin() : *after;
   return std::abs(nearest - stamp) <= kNear_s ? std::optional(pose) : std::nullopt;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Transforms that others publish on ROS 2's network, received by a thread of its own.
+// Transforms that others publish on ROS 2's network, received by a separate thread.
 #include <chrono>
 #include <cstdint>
 #include <deque>
@@ -27,7 +27,7 @@ class TransformListener {
   /// The pose of `child` in `parent` by /tf_static; waits for it. None: there is no chain between them.
   [[nodiscard]] std::optional<geometry::Rigid3> wait_for(const std::string& parent, const std::string& child,
                                                          std::chrono::milliseconds most) const;
-  /// The parent that somebody else gives the base on /tf; "": nobody does so far.
+  /// The parent of the base in transforms of others on /tf; "" if there was none so far.
   [[nodiscard]] std::string other_parent() const;
   /// The base in that parent, at a stamp (seconds) or, outside of what was received, at the nearest one
   /// within half a second. None: nothing was received there.

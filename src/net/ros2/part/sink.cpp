@@ -64,6 +64,8 @@ class Ros2Sink final : public dataset::MessageSink {
     if (writers_.count(topic) != 0) return {};
     const KnownType* known = known_type(type);
     if (known == nullptr) return core::usage_error(fmt::format("{}: {} cannot be published", topic, type));
+
+    // Late subscribers get the retained message
     Writer writer{0, known->descriptor};
     const dds_entity_t dds_topic = participant_.topic(topic, *known);
     writer.handle =
@@ -95,6 +97,7 @@ class Ros2Sink final : public dataset::MessageSink {
   }
 
   void flush(std::chrono::milliseconds most) override {
+    // All topics share the time
     const auto until = std::chrono::steady_clock::now() + most;
     for (const auto& [topic, writer] : writers_) {
       const auto left =

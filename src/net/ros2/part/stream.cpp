@@ -28,6 +28,8 @@ class Ros2Stream final : public dataset::MessageStream {
 
   core::Result<void> open(const NetworkOptions& options) {
     if (auto opened = participant_.open(options, Ros2Role::kListener); !opened) return opened;
+
+    // A built-in topic of DDS lists the publishers
     publications_ =
         dds_create_reader(participant_.handle(), DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr);
     waitset_ = dds_create_waitset(participant_.handle());
@@ -36,6 +38,7 @@ class Ros2Stream final : public dataset::MessageStream {
                                          dds_strretcode(std::min(publications_, waitset_))));
   }
 
+  /// All topics, including those of types that are not known.
   std::vector<dataset::StreamTopic> topics() override {
     look_around();
     std::vector<dataset::StreamTopic> topics;
@@ -48,6 +51,8 @@ class Ros2Stream final : public dataset::MessageStream {
 
   core::Result<void> subscribe(const std::string& topic) override {
     if (readers_.count(topic) != 0) return {};
+
+    // The publisher may be new
     look_around();
     const auto found = seen_.find(topic);
     if (found == seen_.end()) return core::input_error(topic + ": nobody publishes it");
@@ -56,6 +61,7 @@ class Ros2Stream final : public dataset::MessageStream {
     if (type == nullptr)
       return core::input_error(fmt::format("{}: is of {}, which is not read", topic, found->second.type));
 
+    // The reader requests no more than publishers offer
     Reader reader;
     const dds_entity_t dds_topic = participant_.topic(topic, *type);
     reader.handle =
@@ -65,6 +71,7 @@ class Ros2Stream final : public dataset::MessageStream {
           fmt::format("{}: cannot be subscribed to ({})", topic, dds_strretcode(reader.handle)));
     }
 
+    // The wait for messages includes this topic
     reader.condition = dds_create_readcondition(reader.handle, DDS_ANY_STATE);
     dds_waitset_attach(waitset_, reader.condition, reader.handle);
     readers_.emplace(topic, reader);
@@ -74,6 +81,8 @@ class Ros2Stream final : public dataset::MessageStream {
   void unsubscribe(const std::string& topic) override {
     const auto found = readers_.find(topic);
     if (found == readers_.end()) return;
+
+    // Counts of lost messages outlive the reader
     lost_before_ += lost_by(found->second);
     dds_waitset_detach(waitset_, found->second.condition);
     dds_delete(found->second.handle);
@@ -118,13 +127,14 @@ class Ros2Stream final : public dataset::MessageStream {
     return dds_get_sample_lost_status(reader.handle, &status) == DDS_RETCODE_OK ? status.total_count : 0;
   }
 
-  /// Publications that were found since the last look. Of several of one topic the least that is offered
-  /// counts.
+  /// Adds the publications that were found since the last call.
   void look_around() {
     void* sample = nullptr;
     dds_sample_info_t info;
     while (dds_take(publications_, &sample, &info, 1, 1) > 0) {
       const auto& endpoint = *static_cast<const dds_builtintopic_endpoint_t*>(sample);
+
+      // Publishers that left have no valid data
       const std::string name = info.valid_data ? ros_topic(endpoint.topic_name) : "";
 
       if (!name.empty()) {
@@ -134,6 +144,7 @@ class Ros2Stream final : public dataset::MessageStream {
         dds_qget_reliability(endpoint.qos, &reliability, &blocking);
         dds_qget_durability(endpoint.qos, &durability);
 
+        // The weakest offer of all publishers counts
         Publication& publication = seen_[name];
         publication.type = endpoint.type_name;
         publication.reliable = publication.reliable && reliability == DDS_RELIABILITY_RELIABLE;
@@ -162,6 +173,8 @@ class Ros2Stream final : public dataset::MessageStream {
     dds_sample_info_t info;
     while (dds_takecdr(reader.handle, &data, 1, &info, DDS_ANY_STATE) > 0) {
       std::optional<dataset::StreamMessage> message;
+
+      // Samples without data report changes of state
       if (info.valid_data) {
         message.emplace();
         message->topic = name;
