@@ -92,12 +92,14 @@ class TrackStage : public Stage {
     // The pose, and what the frame adds to the map.
     mapping::Slam& slam = *slams_[number];
     const std::size_t poses = slam.frame_poses().size();
-    const int taken_back = slam.taken_back();
+    const mapping::Components& components = slam.connections().components();
+    const int taken_back = components.taken_back();
 
     bodies_->before(robot.number, frame->stamp);
     const mapping::FrameReport report = slam.process(*frame, features);
     bodies_->after(robot.number, slam.frame_poses());
-    if (slam.taken_back() > taken_back) unstored_[number].since = {};  // edges that are stored have changed
+    if (components.taken_back() > taken_back)
+      unstored_[number].since = {};  // edges that are stored have changed
     note(io.frame(), robot, report, shows_nothing(*frame, features->points.size()));
 
     auto tracked = std::make_shared<TrackedFrame>();
@@ -126,7 +128,7 @@ class TrackStage : public Stage {
     cameras_->after(io.frame(), slams_);
     const std::filesystem::path& debug = context_->hooks.debug_folder;
     if (debug.empty()) return {};
-    return write_debug_picture(debug, io.frame(), *frame, *features, slam, report, robot.camera.color);
+    return write_debug_picture(debug, io.frame(), *frame, *features, slam.map(), report, robot.camera.color);
   }
 
   core::Result<void> finish(StageIo& io) override {
@@ -172,7 +174,7 @@ class TrackStage : public Stage {
       const mapping::Slam& slam = *slams_[static_cast<std::size_t>(robot.number)];
       report_loops(slam, summary["loops"]);
       report_joins(robot.name, slam, component_frames_, components["list"]);
-      add(summary["path"]["refused_adjustments"], static_cast<std::size_t>(slam.refused()));
+      add(summary["path"]["refused_adjustments"], static_cast<std::size_t>(slam.connections().refused()));
       if (several())
         summary["robots"].push_back({{"name", robot.name}, {"keyframes", slam.map().keyframe_count()}});
     }
@@ -294,13 +296,6 @@ class TrackStage : public Stage {
       unstored_[number].since = slams_[number]->map().now();
     }
   }
-
-  /// Path of one robot, for observers.
-  struct Way {
-    core::KeyframeId component;       ///< component that is reported
-    std::optional<std::size_t> last;  ///< index of the latest frame pose
-    geometry::Rigid3 odometry_from_camera;
-  };
 
   const RunContext* context_ = nullptr;
   mapping::SlamOptions options_;
