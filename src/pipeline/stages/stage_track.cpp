@@ -9,7 +9,6 @@
 #include <optional>
 #include <utility>
 
-#include "plumbline/core/csv.hpp"
 #include "plumbline/mapping/slam.hpp"
 #include "plumbline/pipeline/observer.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
@@ -159,11 +158,12 @@ class TrackStage : public Stage {
 
   void report(Json& summary) const override {
     // A dropped component's frames have no pose.
-    Json& frames = summary["frames"];
-    report_frames(rows_, frames);
-    frames["period_s"] = rounded(period_s());
-    frames["tracked"] = frames["tracked"].get<std::size_t>() - dropped_frames_;
-    add(frames["lost"], dropped_frames_);
+    FrameCounts frames(summary);
+    frames.count(rows_);
+    frames.period_s = rounded(period_s());
+    frames.tracked -= dropped_frames_;
+    frames.lost += dropped_frames_;
+    frames.write(summary);
     bodies_->report(summary);
 
     Json& components = summary["components"];
@@ -205,9 +205,7 @@ class TrackStage : public Stage {
   }
 
   void note(std::size_t frame, const RobotInfo& robot, const mapping::FrameReport& report, bool blind) {
-    const std::string columns = row_columns(report, blind);
-    rows_.push_back({frame, tracking::to_string(report.state),
-                     several() ? core::csv_field(robot.name) + "," + columns : columns});
+    rows_.push_back(row_of(frame, report, blind, several() ? robot.name : ""));
     mark_blind(rows_.size() - 1);
     if (report.keyframe.valid()) ++causes_[report.decision.cause];
     if (report.component.valid()) ++component_frames_[report.component];
@@ -223,7 +221,7 @@ class TrackStage : public Stage {
   void mark_blind(std::size_t row) {
     constexpr std::size_t kFewest = 3;
     std::vector<std::size_t>& run = blind_[recordings().robot_of(rows_[row].frame)];
-    if (rows_[row].state != "tracked" && was_blind(rows_[row].columns))
+    if (rows_[row].state != FrameState::kTracked && rows_[row].shows_nothing)
       run.push_back(row);
     else
       run.clear();
