@@ -107,6 +107,34 @@ class PartsCollector {
 
 }  // namespace
 
+void renumber(MapParts& parts, const RobotNumbers& to) {
+  const auto rename = [&](auto& id) { id = renamed(id, to); };
+  const auto rename_seen = [&](auto& landmark) {
+    rename(landmark.id);
+    for (Observation& o : landmark.observations) rename(o.keyframe);
+  };
+
+  // Keyframes are shared with others, so that each gets a new one.
+  for (MapParts::KeyframePart& part : parts.keyframes) {
+    auto data = std::make_shared<Keyframe>(*part.data);
+    rename(data->id);
+    rename(data->reference);
+    part.data = std::move(data);
+    rename(part.parent);
+  }
+
+  for (MapPoint& point : parts.points) {
+    rename_seen(point);
+    rename(point.angle_keyframe);
+  }
+  for (MapLine& line : parts.lines) rename_seen(line);
+  for (auto& [order, edge] : parts.edges) rename(edge);
+  for (LoopEdge& loop : parts.loops) rename(loop);
+  for (KeyframeId& id : parts.next.keyframes) rename(id);
+  for (core::PointId& id : parts.next.points) rename(id);
+  for (core::LineId& id : parts.next.lines) rename(id);
+}
+
 Map renumbered(const Map& map, const RobotNumbers& to) {
   PartsCollector collector;
   collector.add(map, to, Rigid3{});

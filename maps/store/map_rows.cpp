@@ -2,8 +2,10 @@
 #include "store/map_rows.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <stdexcept>
 
+#include "plumbline/maps/map_join.hpp"
 #include "plumbline/maps/store_replica.hpp"
 #include "store/store_row.hpp"
 
@@ -48,6 +50,17 @@ void check_frames(const std::vector<FramePose>& frames, const Map& map) {
     if (frame.tracked && !map.has_keyframe(frame.reference)) {
       throw BadBytes("a frame hangs on a keyframe that is not there");
     }
+  }
+}
+
+/// Robot 0, which must be the only one, gets another number.
+void rename_only_robot(std::int32_t number, MapParts& parts, std::vector<FramePose>& frames) {
+  const auto is_other = [](const MapParts::KeyframePart& part) { return part.data->id.robot != 0; };
+  if (std::any_of(parts.keyframes.begin(), parts.keyframes.end(), is_other))
+    throw BadBytes("they are of several robots");
+  renumber(parts, {{0, number}});
+  for (FramePose& frame : frames) {
+    if (frame.reference.valid()) frame.reference.robot = number;
   }
 }
 
@@ -154,7 +167,7 @@ void MapRows::check_owners() const {
   check(log_);
 }
 
-StoredMap MapRows::map(std::int64_t robot, const MapRow& row) const {
+StoredMap MapRows::map(std::int64_t robot, const MapRow& row, std::optional<std::int32_t> number) const {
   // Each keyframe has one pose and one parent
   MapParts parts;
   if (keyframes_.size() != states_.size()) throw BadBytes("a keyframe has no pose, or a pose no keyframe");
@@ -187,6 +200,7 @@ StoredMap MapRows::map(std::int64_t robot, const MapRow& row) const {
 
   // Missing pages and contradictions are damage
   check_totals(row, parts, stored);
+  if (number) rename_only_robot(*number, parts, stored.frames);
   try {
     stored.map = Map(std::move(parts));
   } catch (const std::invalid_argument& contradiction) {
@@ -197,22 +211,22 @@ StoredMap MapRows::map(std::int64_t robot, const MapRow& row) const {
 }
 
 /// One map per robot, or one map of all.
-std::vector<StoredMap> MapRows::maps() const {
+std::vector<StoredMap> MapRows::maps(std::optional<std::int32_t> number) const {
   check_owners();
   std::vector<StoredMap> maps;
   for (const auto& [key, row] : maps_) {
-    maps.push_back(map(key.first, row));
+    maps.push_back(map(key.first, row, number));
     if (maps_.size() > 1) maps.back().robot = static_cast<std::int32_t>(key.first);
   }
-  if (maps_.empty()) maps.push_back(map(0, {}));  // no row yet
+  if (maps_.empty()) maps.push_back(map(0, {}, number));  // no row yet
   return maps;
 }
 
 /// The map as of the last transaction; fails if a row was damaged.
-core::Result<StoredMap> GrowingMap::map() const {
+core::Result<StoredMap> GrowingMap::map(std::optional<std::int32_t> number) const {
   try {
     if (!damage.empty()) throw BadBytes(damage);
-    std::vector<StoredMap> maps = rows.maps();
+    std::vector<StoredMap> maps = rows.maps(number);
     if (maps.size() != 1) throw BadBytes("they are of several robots");
     maps.front().header.robots = robots;
     return std::move(maps.front());
@@ -221,31 +235,36 @@ core::Result<StoredMap> GrowingMap::map() const {
   }
 }
 
-MapFollower::MapFollower() : map_(std::make_unique<GrowingMap>()) {}
-MapFollower::MapFollower(const GrowingMap& map) : map_(std::make_unique<GrowingMap>(map)) {}
-MapFollower::MapFollower(MapFollower&& other) noexcept = default;
-MapFollower& MapFollower::operator=(MapFollower&& other) noexcept = default;
-MapFollower::~MapFollower() = default;
+GrowingMap& own(std::shared_ptr<GrowingMap>& map) {
+  if (map.use_count() > 1) map = std::make_shared<GrowingMap>(*map);
+  std::atomic_thread_fence(std::memory_order_acquire);  // whoever shared it has read it
+  return *map;
+}
+
+MapFollower::MapFollower() : map_(std::make_shared<GrowingMap>()) {}
 
 std::int64_t MapFollower::head() const { return map_->head; }
-core::Result<StoredMap> MapFollower::map() const { return map_->map(); }
+core::Result<StoredMap> MapFollower::map(std::optional<std::int32_t> number) const {
+  return map_->map(number);
+}
 
 /// Applies a transaction's rows to the growing map; the first bad row ends it.
 core::Result<void> MapFollower::apply(const StoreTransaction& transaction) {
+  GrowingMap& map = own(map_);
   try {
     Bytes rows = transaction.rows;
     consume_rows(rows, [&](const StoreRow& row, std::size_t) {
       const char* table = kRowTables[row.name.table].name;
       if (std::string(table) == "attachment") return;
       const MapRows::Key key{row.name.robot, row.name.number};
-      if (row.removed) return map_->rows.remove(table, key);
-      map_->rows.put(key, check_row(row.name, row.data, map_->robots));
+      if (row.removed) return map.rows.remove(table, key);
+      map.rows.put(key, check_row(row.name, row.data, map.robots));
     });
     if (!rows.empty()) throw BadBytes("a row ends too early");
   } catch (const BadBytes& bad) {
     return core::input_error(std::string("rows of a map: ") + bad.what());
   }
-  map_->head = transaction.number;
+  map.head = transaction.number;
   return {};
 }
 

@@ -4,6 +4,7 @@
 // The rows of maps, decoded one by one: all of a file at once, or as they arrive.
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <variant>
@@ -36,16 +37,17 @@ class MapRows {
   /// Applies the present content of a row; rows of other tables are skipped.
   void put(const Key& key, RowContent content);
   void remove(const std::string& table, const Key& key);
-  /// Each map that there is, by robot, without header: the only one, or each robot's own. Throws BadBytes:
-  /// rows are missing or contradict each other.
-  [[nodiscard]] std::vector<StoredMap> maps() const;
+  /// Each map that there is, by robot, without header: the only one, or each robot's own. `number`: as
+  /// MapFollower::map(). Throws BadBytes: rows are missing or contradict each other.
+  [[nodiscard]] std::vector<StoredMap> maps(std::optional<std::int32_t> number = {}) const;
 
  private:
   template <typename Row>
   using Table = std::map<Key, Row>;
   template <typename Row>
   [[nodiscard]] std::vector<Row> gathered(const Table<Page<Row>>& pages, std::int64_t robot) const;
-  [[nodiscard]] StoredMap map(std::int64_t robot, const MapRow& row) const;
+  [[nodiscard]] StoredMap map(std::int64_t robot, const MapRow& row,
+                              std::optional<std::int32_t> number) const;
   /// True if a row belongs to the map of `robot`.
   [[nodiscard]] bool is_of(const Key& key, std::int64_t robot) const;
   void check_owners() const;
@@ -68,7 +70,10 @@ struct GrowingMap {
   std::string damage;     ///< why rows cannot be read; empty: they can
 
   /// With the robots as header. Errors as MapFollower::map().
-  [[nodiscard]] core::Result<StoredMap> map() const;
+  [[nodiscard]] core::Result<StoredMap> map(std::optional<std::int32_t> number) const;
 };
+
+/// The map to change: a copy of its own, if others hold it too. Copies share rows, but not their table.
+GrowingMap& own(std::shared_ptr<GrowingMap>& map);
 
 }  // namespace plumbline::maps

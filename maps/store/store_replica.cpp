@@ -57,26 +57,27 @@ struct StoreReplica::Impl {
   }
   /// Rows of a damaged file are an error only for those who need its map.
   void read_map() {
-    map = {};
+    map = std::make_shared<GrowingMap>();
     try {
-      map.robots = read_robots(*database);
-      map.rows = MapRows::read(*database, map.robots);
+      map->robots = read_robots(*database);
+      map->rows = MapRows::read(*database, map->robots);
     } catch (const std::exception& bad) {  // BadBytes, or SQLite's
-      map.damage = bad.what();
+      map->damage = bad.what();
     }
-    map.head = heads.map;
+    map->head = heads.map;
   }
   void reread() {
     heads = read_heads(*database);
     keyframes = static_cast<std::size_t>(database->number("SELECT count(*) FROM keyframe"));
     complete = database->number("SELECT data FROM header WHERE key = 'complete'") == 1;
   }
-  void roll_back() {
+  /// Forgets the transaction: rolled back, unless it was committed.
+  void end_transaction() {
     open.reset();
     partial_row.clear();
     pending = {};
     changes.clear();
-    robots = map.robots;
+    robots = map->robots;
   }
   void apply_row(const StoreRow& row);
   void put(const RowTable& table, const StoreRow& row);
@@ -86,7 +87,7 @@ struct StoreReplica::Impl {
   template <typename Action>
   core::Result<void> guard(const Action& action) {
     core::Result<void> done = guarded(file, ErrorKind::kOutput, action);
-    if (!done) roll_back();
+    if (!done) end_transaction();
     return done;
   }
 
@@ -96,7 +97,7 @@ struct StoreReplica::Impl {
   std::size_t keyframes = 0;
   bool complete = false;
   ReplicaBytes bytes;
-  GrowingMap map;  ///< of what is committed
+  std::shared_ptr<GrowingMap> map = std::make_shared<GrowingMap>();  ///< of what is committed
   // The open transaction:
   std::unique_ptr<Transaction> open;
   StoreStream stream = StoreStream::kMap;
@@ -198,16 +199,17 @@ void StoreReplica::Impl::apply_row(const StoreRow& row) {
 
 /// Applies the rows that were committed to the file to the decoded map.
 void StoreReplica::Impl::apply_changes() {
-  map.robots = robots;
+  GrowingMap& present = own(map);
+  present.robots = robots;
   for (Change& change : changes) {
     const MapRows::Key key{change.name.robot, change.name.number};
     if (change.content) {
-      map.rows.put(key, std::move(*change.content));
+      present.rows.put(key, std::move(*change.content));
     } else {
-      map.rows.remove(kRowTables[change.name.table].name, key);
+      present.rows.remove(kRowTables[change.name.table].name, key);
     }
   }
-  if (stream == StoreStream::kMap) map.head = number;
+  if (stream == StoreStream::kMap) present.head = number;
 }
 
 StoreReplica::StoreReplica(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -215,7 +217,7 @@ StoreReplica::StoreReplica(StoreReplica&& other) noexcept = default;
 StoreReplica& StoreReplica::operator=(StoreReplica&& other) noexcept = default;
 StoreReplica::~StoreReplica() {
   if (impl_ == nullptr) return;
-  impl_->roll_back();
+  impl_->end_transaction();
   const auto left =
       guarded(impl_->file, ErrorKind::kOutput, [&] { impl_->database->run("PRAGMA journal_mode = DELETE"); });
   (void)left;  // fails while another program reads; then file and log together are complete
@@ -231,11 +233,11 @@ std::size_t StoreReplica::keyframes() const { return impl_->keyframes; }
 bool StoreReplica::complete() const { return impl_->complete; }
 MapFollower StoreReplica::map() const { return MapFollower(impl_->map); }
 const ReplicaBytes& StoreReplica::bytes() const { return impl_->bytes; }
-void StoreReplica::roll_back() { impl_->roll_back(); }
+void StoreReplica::roll_back() { impl_->end_transaction(); }
 
 /// Transactions must arrive in order.
 core::Result<void> StoreReplica::begin(StoreStream stream, std::int64_t number) {
-  impl_->roll_back();
+  impl_->end_transaction();
   return impl_->guard([&] {
     if (number <= impl_->heads[stream]) throw BadBytes("transaction " + std::to_string(number) + " is old");
     impl_->open = std::make_unique<Transaction>(*impl_->database, true);
@@ -265,7 +267,7 @@ core::Result<void> StoreReplica::commit() {
     impl_->open->commit();
     impl_->apply_changes();
     const ReplicaBytes received = impl_->pending;
-    impl_->roll_back();
+    impl_->end_transaction();
     impl_->bytes.place += received.place;
     impl_->bytes.map += received.map;
     impl_->bytes.cloud += received.cloud;
@@ -275,7 +277,7 @@ core::Result<void> StoreReplica::commit() {
 
 /// Empties the replica, for a sender that starts again.
 core::Result<void> StoreReplica::clear() {
-  impl_->roll_back();
+  impl_->end_transaction();
   return impl_->guard([&] {
     Transaction whole(*impl_->database, true);
     for (const RowTable& table : kRowTables) {

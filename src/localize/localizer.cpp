@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "plumbline/features/rolling_shutter.hpp"
-#include "plumbline/mapping/loop_closing/relocalisation_check.hpp"
+#include "plumbline/mapping/loop_closing/relocalisation.hpp"
 
 namespace plumbline::localize {
 
@@ -145,7 +145,7 @@ std::vector<LocatedFrame> Localizer::process(std::size_t number, const sensor::R
   // A place is believed once it was tracked for a while and the image is recognised there again.
   waiting_.push_back(std::move(result));
   if (static_cast<int>(waiting_.size()) >= options_.confirm &&
-      places_.confirms(frame, features, tracker_.reference(), tracker_.camera_from_world())) {
+      places_.confirms(frame, features, around_.local_map.reference, tracker_.lost().camera_from_world)) {
     state_ = State::kLocated;
   } else if (waiting_.size() >= kMostWaiting) {
     refuse_waiting("the place could not be confirmed");
@@ -188,7 +188,7 @@ Localizer::Features Localizer::without_shutter(const Features& features) const {
 
 /// Tracks the frame from the one before.
 void Localizer::follow(const sensor::RgbdFrame& frame, const Features& features, LocatedFrame& result) {
-  const tracking::TrackResult track = tracker_.follow(map_.map, frame, without_shutter(features));
+  const tracking::TrackResult track = tracker_.follow(map_.map, around_, frame, without_shutter(features));
   result.reason = doubt(track);
   result.located = result.reason.empty();
   if (!result.located) {
@@ -212,11 +212,11 @@ void Localizer::search(const sensor::RgbdFrame& frame, const Features& features,
 
   // Aligned with the map around.
   const bool stays = state_ == State::kLocated && missed_ <= kStillThere &&
-                     mapping::is_near(answer.camera_from_world, tracker_.camera_from_world(), kStillThere_m,
-                                      kStillThere_rad);
+                     mapping::is_near(answer.camera_from_world, tracker_.lost().camera_from_world,
+                                      kStillThere_m, kStillThere_rad);
   tracker_.begin_at(answer.camera_from_world, frame, features);
-  tracker_.map_changed(map_.map, *answer.keyframe, answer.camera_from_world);
-  const tracking::TrackResult track = tracker_.follow(map_.map, frame, features);
+  look_around(*answer.keyframe);
+  const tracking::TrackResult track = tracker_.follow(map_.map, around_, frame, features);
 
   const std::string doubtful = doubt(track);
   result.located = doubtful.empty();
@@ -263,7 +263,7 @@ void Localizer::take(const tracking::TrackResult& track, LocatedFrame& result) {
 /// The distance of the nearest of the views around that were mapped, metres.
 double Localizer::distance_from_map(const Rigid3& camera_from_world, double depth_m) const {
   double least = std::numeric_limits<double>::max();
-  for (const KeyframeId id : tracker_.local_map().keyframes)
+  for (const KeyframeId id : around_.local_map.keyframes)
     least = std::min(least, distance(camera_from_world, map_.map.camera_from_world(id), depth_m));
   return least;
 }
@@ -311,7 +311,11 @@ void Localizer::move_reference(const tracking::TrackResult& track) {
   // With few shared landmarks the distance decides
   const bool alone = best == track.reference && common[best] < kEnough;
   if (alone) best = nearest(map_.map, track.camera_from_world, best, kClearly);
-  if (best != track.reference) tracker_.map_changed(map_.map, best, track.camera_from_world);
+  if (best != track.reference) look_around(best);
+}
+
+void Localizer::look_around(KeyframeId reference) {
+  around_.local_map = tracking::build_local_map(map_.map, reference, options_.tracker.local_map);
 }
 
 }  // namespace plumbline::localize

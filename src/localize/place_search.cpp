@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "plumbline/mapping/loop_closing/relocalisation_check.hpp"
+#include "plumbline/mapping/loop_closing/relocalisation.hpp"
 
 namespace plumbline::localize {
 

@@ -13,13 +13,12 @@ using geometry::Rigid3;
 
 namespace {
 
-/// Photometric terms of the first keyframe that has enough of its samples in the view.
-std::optional<optimize::PhotometricFamily> comparable(const PhotometricKeyframes& known, const maps::Map& map,
-                                                      const std::vector<core::KeyframeId>& keyframes,
+/// Photometric terms of the first keyframe around that has enough of its samples in the view.
+std::optional<optimize::PhotometricFamily> comparable(const Surroundings& around, const maps::Map& map,
                                                       std::size_t level, const PhotometricView& view,
                                                       const Rigid3& camera_from_world) {
-  for (const core::KeyframeId id : keyframes) {
-    const auto samples = known.find(id);
+  for (const core::KeyframeId id : around.local_map.keyframes) {
+    const auto samples = around.photometric.find(id);
     if (samples == nullptr) continue;
     auto family = photometric_in_view(*samples, level, view, map.camera_from_world(id), camera_from_world);
     if (!family) continue;
@@ -32,22 +31,22 @@ std::optional<optimize::PhotometricFamily> comparable(const PhotometricKeyframes
 
 }  // namespace
 
-TrackResult Tracker::align(const maps::Map& map, const TrackedImage& image, const Rigid3& hypothesis,
+TrackResult Tracker::align(const Scene& scene, const TrackedImage& image, const Rigid3& hypothesis,
                            double search_radius_px) const {
-  const AlignmentInput input{options_,     camera_, map,   local_map_,
-                             photometric_, motion_, image, depth_delay_s(image.frame)};
+  const AlignmentInput input{
+      options_, camera_, scene.map, scene.around, motion_, image, depth_delay_s(image.frame)};
   return FrameAligner(input, hypothesis, search_radius_px).run();
 }
 
-Tracker::PoseHypotheses Tracker::pose_hypotheses(const maps::Map& map, const sensor::RgbdFrame& frame,
+Tracker::PoseHypotheses Tracker::pose_hypotheses(const Scene& scene, const sensor::RgbdFrame& frame,
                                                  const features::FrameFeatures& features) const {
   PoseHypotheses result;
   const Rigid3 predicted = motion_.predict(frame.stamp);
   const Rigid3& last = motion_.camera_from_world();
 
   if (options_.pnp_start) {  // METHOD section 2: PnP, then Levenberg-Marquardt
-    const auto seen =
-        tracking::relocalise(map, {local_map_.reference}, features, camera_, options_.min_inliers);
+    const auto seen = tracking::relocalise(scene.map, {scene.around.local_map.reference}, features, camera_,
+                                           options_.min_inliers);
     if (seen) result.camera_from_world.push_back(seen->camera_from_world);
     result.searched = seen.has_value();
   }
@@ -66,13 +65,13 @@ Tracker::PoseHypotheses Tracker::pose_hypotheses(const maps::Map& map, const sen
 
   // Intensity may show which one is the best
   if (options_.photometric && features.photometric != nullptr)
-    rank_by_intensity(map, {features.photometric.get(), &frame.depth, {}, camera_}, result);
+    rank_by_intensity(scene, {features.photometric.get(), &frame.depth, {}, camera_}, result);
   return result;
 }
 
 /// In front of a bare wall thumbnails fit anywhere, and the motion model lags behind: fine texture shows
 /// which hypothesis is the best, or how far to the side of it the camera points.
-void Tracker::rank_by_intensity(const maps::Map& map, const PhotometricView& view,
+void Tracker::rank_by_intensity(const Scene& scene, const PhotometricView& view,
                                 PoseHypotheses& hypotheses) const {
   constexpr std::size_t kCoarse = 1;
   constexpr double kSure = 0.3;  // smallest correlation of a shifted pose
@@ -82,8 +81,7 @@ void Tracker::rank_by_intensity(const maps::Map& map, const PhotometricView& vie
 
   // Agreement of each hypothesis with a keyframe's intensity
   for (const Rigid3& pose : poses) {
-    const auto& family =
-        families.emplace_back(comparable(photometric_, map, local_map_.keyframes, kCoarse, view, pose));
+    const auto& family = families.emplace_back(comparable(scene.around, scene.map, kCoarse, view, pose));
     agreement.push_back(family
                             ? std::optional(optimize::photometric_correlation(*family, pose, kMinPhotometric))
                             : std::nullopt);
@@ -122,13 +120,13 @@ bool Tracker::jumps(double stamp, const Rigid3& camera_from_world) const {
   return jump.translation.norm() > kMost_m || geometry::rotation_angle(jump.rotation) > kMost_rad;
 }
 
-std::optional<TrackResult> Tracker::track_with_motion_model(const maps::Map& map,
+std::optional<TrackResult> Tracker::track_with_motion_model(const Scene& scene,
                                                             const TrackedImage& image) const {
   constexpr double kClearly = 1.15;  // more support than the pose near by, or than the likeliest one
   if (motion_.expired()) return std::nullopt;
 
   const features::FrameFeatures& features = *image.synchronised;
-  const PoseHypotheses hypotheses = pose_hypotheses(map, image.frame, features);
+  const PoseHypotheses hypotheses = pose_hypotheses(scene, image.frame, features);
   const auto tracked = [&](const TrackResult& attempt) {
     return attempt.state == TrackState::kTracked &&
            (!motion_.outdated() || passes_strict_check(attempt, features));
@@ -136,11 +134,11 @@ std::optional<TrackResult> Tracker::track_with_motion_model(const maps::Map& map
 
   std::optional<TrackResult> best;
   for (const Rigid3& hypothesis : hypotheses.camera_from_world) {
-    TrackResult attempt = align(map, image, hypothesis, motion_.search_radius_px());
+    TrackResult attempt = align(scene, image, hypothesis, motion_.search_radius_px());
     // Among similar landmarks, such as the keys of a keyboard, wrong matches of the wide search can pull the
     // pose beyond the reach of the fine rounds: the right ones around the hypothesis would never be tried.
     if (jumps(image.frame.stamp, attempt.camera_from_world)) {
-      TrackResult near = align(map, image, hypothesis, 0.0);
+      TrackResult near = align(scene, image, hypothesis, 0.0);
       if (tracked(near) && !(tracked(attempt) && support(attempt) > kClearly * support(near)))
         attempt = std::move(near);
     }
@@ -155,7 +153,8 @@ std::optional<TrackResult> Tracker::track_with_motion_model(const maps::Map& map
 }
 
 std::vector<Tracker::PlaceHypothesis> Tracker::place_hypotheses(
-    const maps::Map& map, const features::FrameFeatures& features) const {
+    const Scene& scene, const features::FrameFeatures& features) const {
+  const maps::Map& map = scene.map;
   constexpr int kLookAlikes = 24;
   constexpr std::size_t kAligned = 3;
   std::vector<LookAlike> alike;
@@ -169,9 +168,9 @@ std::vector<Tracker::PlaceHypothesis> Tracker::place_hypotheses(
       if (std::find(candidates.begin(), candidates.end(), id) == candidates.end()) candidates.push_back(id);
     };
 
-    for (core::KeyframeId id : local_map_.keyframes) add(id);
-    if (find_places_) {
-      for (core::KeyframeId id : find_places_(features)) add(id);
+    for (core::KeyframeId id : scene.around.local_map.keyframes) add(id);
+    if (scene.relocaliser != nullptr) {
+      for (core::KeyframeId id : scene.relocaliser->look_alikes(map, features)) add(id);
     }
     for (const LookAlike& a : alike) add(a.keyframe);
 
@@ -188,23 +187,25 @@ std::vector<Tracker::PlaceHypothesis> Tracker::place_hypotheses(
   return hypotheses;
 }
 
-std::optional<TrackResult> Tracker::relocalise(const maps::Map& map, const TrackedImage& image) {
+std::optional<TrackResult> Tracker::relocalise(const Scene& scene, const TrackedImage& image) {
   const features::FrameFeatures& features = *image.synchronised;
-  const std::vector<PlaceHypothesis> hypotheses = place_hypotheses(map, features);
-  LocalMap before = std::move(local_map_);
+  const std::vector<PlaceHypothesis> hypotheses = place_hypotheses(scene, features);
+  LocalMap& local_map = scene.around.local_map;
+  LocalMap before = std::move(local_map);
 
   // The first place that passes all checks
   for (const PlaceHypothesis& place : hypotheses) {
-    local_map_ = build_local_map(map, place.keyframe, options_.local_map);
-    TrackResult attempt = align(map, image, place.camera_from_world, place.coarse ? 24.0 : 10.0);
+    local_map = build_local_map(scene.map, place.keyframe, options_.local_map);
+    TrackResult attempt = align(scene, image, place.camera_from_world, place.coarse ? 24.0 : 10.0);
     if (attempt.state != TrackState::kTracked || attempt.dead_reckoned) continue;
     if (place.coarse && !passes_strict_check(attempt, features)) continue;
-    if (is_place_ && !is_place_(image.frame, features, place.keyframe, attempt.camera_from_world)) continue;
+    const FoundFrame found{image.frame, features, place.keyframe, attempt.camera_from_world};
+    if (scene.relocaliser != nullptr && !scene.relocaliser->is_place(scene.map, lost(), found)) continue;
     attempt.relocalised = true;
     motion_.reset();
     return attempt;
   }
-  local_map_ = std::move(before);  // a mistake must not take the surroundings away
+  local_map = std::move(before);  // a mistake must not take the surroundings away
   return std::nullopt;
 }
 

@@ -64,24 +64,28 @@ void Tracker::sense(const sensor::RgbdFrame& frame) {
   if (sensor_) motion_.set_sensed(sensor_(motion_.last_stamp(), frame.stamp));
 }
 
-TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features) {
+TrackResult Tracker::track(const maps::Map& map, Surroundings& around, const sensor::RgbdFrame& frame,
+                           const Features& features, const Relocaliser* relocaliser) {
   sense(frame);
   if (map.keyframe_count() == 0) return initialise(frame, features);
 
+  // A camera that has been lost for a while is looked for by its appearance first.
+  const Scene scene{map, around, relocaliser};
   const TrackedImage image = image_of(frame, features);
 
   // After a long loss, relocalisation comes first
   const bool outdated = motion_.outdated();
-  std::optional<TrackResult> result = outdated ? relocalise(map, image) : track_with_motion_model(map, image);
-  if (!result) result = outdated ? track_with_motion_model(map, image) : relocalise(map, image);
-  return result ? recorded(image, *std::move(result)) : lost(frame);
+  auto found = outdated ? relocalise(scene, image) : track_with_motion_model(scene, image);
+  if (!found) found = outdated ? track_with_motion_model(scene, image) : relocalise(scene, image);
+  return concluded(scene, image, std::move(found));
 }
 
-TrackResult Tracker::follow(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features) {
+TrackResult Tracker::follow(const maps::Map& map, Surroundings& around, const sensor::RgbdFrame& frame,
+                            const Features& features) {
   sense(frame);
+  const Scene scene{map, around, nullptr};
   const TrackedImage image = image_of(frame, features);
-  std::optional<TrackResult> result = track_with_motion_model(map, image);
-  return result ? recorded(image, *std::move(result)) : lost(frame);
+  return concluded(scene, image, track_with_motion_model(scene, image));
 }
 
 TrackedImage Tracker::image_of(const sensor::RgbdFrame& frame, const Features& features) const {
@@ -92,9 +96,14 @@ TrackedImage Tracker::image_of(const sensor::RgbdFrame& frame, const Features& f
   return {frame, features, motion, synchronised(features, frame.depth, camera_, motion)};
 }
 
-TrackResult Tracker::recorded(const TrackedImage& image, TrackResult result) {
-  if (result.features == nullptr) result.features = image.synchronised;
-  record(image.frame, result);
+TrackResult Tracker::concluded(const Scene& scene, const TrackedImage& image,
+                               std::optional<TrackResult> found) {
+  TrackResult result = found ? *std::move(found) : missed(image.frame);
+  if (found) {
+    if (result.features == nullptr) result.features = image.synchronised;
+    record(image.frame, result);
+  }
+  result.reference = scene.around.local_map.reference;
   return result;
 }
 
@@ -106,16 +115,14 @@ TrackResult Tracker::initialise(const sensor::RgbdFrame& frame, const Features& 
   return result;
 }
 
-TrackResult Tracker::lost(const sensor::RgbdFrame& frame) {
+TrackResult Tracker::missed(const sensor::RgbdFrame& frame) {
   TrackResult result;
-  result.reference = reference();
   result.camera_from_world = motion_.predict(frame.stamp);
   motion_.lost();
   return result;
 }
 
 void Tracker::record(const sensor::RgbdFrame& frame, TrackResult& result) {
-  result.reference = reference();
   result.continuous = motion_.reliable(frame.stamp);
   result.photometric = result.features->photometric;
 
@@ -138,31 +145,18 @@ TrackResult Tracker::begin_at(const geometry::Rigid3& camera_from_world, const s
   // Motion does not continue from the frame before
   motion_.reset();
   record(frame, result);
-  result.reference = {};
   return result;
 }
 
-void Tracker::add_keyframe(core::KeyframeId id, const sensor::RgbdFrame& frame, const TrackResult& result) {
-  if (!options_.photometric || result.photometric == nullptr) return;
-  photometric_.add(id, std::make_shared<const features::PhotometricSamples>(features::sample_photometric(
-                           *result.photometric, frame.depth, camera_, result.depth_from_camera.inverse())));
-}
-
-void Tracker::restore(const maps::Map& map, core::KeyframeId reference, const geometry::Vector6d& velocity) {
-  const maps::Keyframe& keyframe = map.keyframe(reference);
-  map_changed(map, reference, map.camera_from_world(reference));
+void Tracker::restore(const maps::Keyframe& keyframe, const geometry::Rigid3& camera_from_world,
+                      const geometry::Vector6d& velocity) {
+  motion_.set_camera_from_world(camera_from_world);
   if (keyframe.features == nullptr) return;
 
   // The next frame is aligned with this keyframe
   motion_.restore(keyframe.stamp, velocity);
   thumbnail_ = keyframe.features->thumbnail;
   thumbnail_depth_ = keyframe.features->thumbnail_depth;
-}
-
-void Tracker::map_changed(const maps::Map& map, core::KeyframeId reference,
-                          const geometry::Rigid3& last_camera_from_world) {
-  local_map_ = build_local_map(map, reference, options_.local_map);
-  motion_.set_camera_from_world(last_camera_from_world);
 }
 
 }  // namespace plumbline::tracking

@@ -51,11 +51,10 @@ class Room {
     for (std::size_t i = 0; i < kMapped; ++i) {
       previous = (*source)->read(i).value();
       previous_features = extractor.extract(previous);
-      slam->process(previous, std::make_shared<features::FrameFeatures>(previous_features));
+      track = *slam->process(previous, std::make_shared<features::FrameFeatures>(previous_features)).track;
     }
     frame = (*source)->read(kMapped).value();
     frame_features = extractor.extract(frame);
-    track = slam->last_track();
     if (track.state != tracking::TrackState::kTracked) throw std::runtime_error("the room was not tracked");
     camera_from_world = track.camera_from_world;
     local_map = tracking::build_local_map(slam->map(), slam->map().keyframe_ids().back(), {});
@@ -210,10 +209,12 @@ void track_frame(benchmark::State& state) {
   for (auto _ : state) {
     state.PauseTiming();
     tracking::Tracker tracker({}, room.camera);
-    tracker.track(maps::Map{}, room.previous, previous);  // remembers the picture
-    tracker.map_changed(map, room.local_map.reference, room.camera_from_world);
+    tracking::Surroundings around;
+    tracker.track(maps::Map{}, around, room.previous, previous);  // remembers the picture
+    around.local_map = room.local_map;
+    tracker.set_camera_from_world(room.camera_from_world);
     state.ResumeTiming();
-    result = tracker.track(map, room.frame, features);
+    result = tracker.track(map, around, room.frame, features);
   }
   if (result.state != tracking::TrackState::kTracked) state.SkipWithError("lost");
   state.counters["points"] = result.estimate.points.inliers;

@@ -67,6 +67,7 @@ class Localizer {
   [[nodiscard]] Features without_shutter(const Features& features) const;
   [[nodiscard]] double distance_from_map(const geometry::Rigid3& camera_from_world, double depth_m) const;
   [[nodiscard]] std::string doubt(const tracking::TrackResult& track) const;
+  void look_around(core::KeyframeId reference);
   void move_reference(const tracking::TrackResult& track);
   void refuse_waiting(const std::string& reason);
 
@@ -76,6 +77,7 @@ class Localizer {
   double readout_s_;  ///< time from the first to the last row of an image; 0: all at once
   PlaceSearch places_;
   tracking::Tracker tracker_;
+  tracking::Surroundings around_;
   State state_ = State::kSearching;
   std::deque<std::pair<double, geometry::Rigid3>>
       path_;                           ///< the last frames in a row: stamp, camera_from_world

@@ -14,6 +14,9 @@ namespace plumbline::maps {
 /// Hash that depends on what the keyframes measured and on their poses, not on names and robots' numbers.
 std::uint64_t content_hash(const Map& map);
 
+/// Gives the robots other numbers, before a map is made of the parts; as renumbered().
+void renumber(MapParts& parts, const std::map<std::int32_t, std::int32_t>& to);
+
 /// The same map with other numbers for its robots; robots that are not named in `to` keep theirs.
 Map renumbered(const Map& map, const std::map<std::int32_t, std::int32_t>& to);
 

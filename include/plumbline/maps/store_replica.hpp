@@ -12,6 +12,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "plumbline/core/error.hpp"
@@ -63,20 +64,18 @@ struct GrowingMap;  // rows of a map, decoded
 class MapFollower {
  public:
   MapFollower();
-  MapFollower(MapFollower&& other) noexcept;
-  MapFollower& operator=(MapFollower&& other) noexcept;
-  ~MapFollower();
   /// Applies the next transaction of the stream kMap. Errors (kInput): a store does not send such bytes.
   core::Result<void> apply(const StoreTransaction& transaction);
   [[nodiscard]] std::int64_t head() const;  ///< number of the last transaction applied
-  /// With the robots' cameras as header. Errors (kInput): rows that belong together are not all here yet, or
-  /// are of several robots whose maps are not one.
-  [[nodiscard]] core::Result<StoredMap> map() const;
+  /// With the robots' cameras as header. `number`: that the robot gets in map and frames, if it is the only
+  /// one. Errors (kInput): rows that belong together are not all here yet, or are of several robots whose
+  /// maps are not one, or with a `number`.
+  [[nodiscard]] core::Result<StoredMap> map(std::optional<std::int32_t> number = {}) const;
 
  private:
   friend class StoreReplica;
-  explicit MapFollower(const GrowingMap& map);
-  std::unique_ptr<GrowingMap> map_;
+  explicit MapFollower(std::shared_ptr<GrowingMap> map) : map_(std::move(map)) {}
+  std::shared_ptr<GrowingMap> map_;  ///< copied before it changes, while others hold it
 };
 
 /// The copy. Rows come from others and are checked before they are stored: known tables, keys in range, bytes
@@ -95,8 +94,8 @@ class StoreReplica {
   [[nodiscard]] const StoreHeads& heads() const;
   /// Number of keyframes in it.
   [[nodiscard]] std::size_t keyframes() const;
-  /// The map that it holds now, decoded as its rows came: a copy of its own, that shares its memory, so that
-  /// other threads may make maps of it. Rows in the file that cannot be decoded are an error of its map().
+  /// The map that it holds now, decoded as its rows came. It stays as it is, so that other threads may make
+  /// maps of it. Rows in the file that cannot be decoded are an error of its map().
   [[nodiscard]] MapFollower map() const;
   /// True if the run came to its end (StoredMap::complete); true only with the last transaction.
   [[nodiscard]] bool complete() const;

@@ -29,12 +29,18 @@ namespace plumbline::pipeline {
 using maps::RobotInfo;
 struct RevisedClouds;
 
+/// Fate of a frame that could be read. Bridged: lost, and given a pose by the gyroscope.
+enum class FrameState : std::uint8_t { kInitialising, kTracked, kLost, kBridged, kLocated };
+const char* to_string(FrameState state);
+
 /// One line of frames.csv.
 struct FrameRow {
   std::size_t frame = 0;  ///< number within the run
-  std::string state;      ///< tracked, lost, initialising; unreadable is added by the writer
-  std::string columns;    ///< the rest, comma-separated, as MapResult::frame_columns names it
-  bool blind = false;     ///< lost, and one of three or more in a row that show nothing
+  FrameState state = FrameState::kLost;
+  std::string
+      columns;  ///< the rest, comma-separated, as MapResult::frame_columns names it; for the file only
+  bool shows_nothing = false;  ///< hardly any depth, or a picture without contrast and corners
+  bool blind = false;          ///< lost, and one of three or more in a row that show nothing
 };
 
 /// The tracker's decision about one frame.

@@ -7,7 +7,6 @@
 // 24(17), 5743. Reads a const map; the module mapping changes it.
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -94,17 +93,53 @@ struct TrackResult {
 
 struct TrackedImage;
 
+/// Everything around the camera that a frame is tracked in.
+struct Surroundings {
+  LocalMap local_map;
+  PhotometricKeyframes photometric;  ///< intensities of the latest keyframes
+};
+
+/// A camera that is lost.
+struct LostCamera {
+  geometry::Rigid3 camera_from_world;  ///< the last pose that was known
+  int frames = 0;                      ///< lost in a row
+  bool astray = false;                 ///< so many that the camera may be elsewhere by now
+};
+
+/// A frame that was found by its appearance.
+struct FoundFrame {
+  const sensor::RgbdFrame& frame;
+  const features::FrameFeatures& features;
+  core::KeyframeId keyframe;  ///< near which it was found
+  const geometry::Rigid3& camera_from_world;
+};
+
+/// Helps a tracker that has lost the camera.
+class Relocaliser {
+ public:
+  virtual ~Relocaliser() = default;
+  /// Keyframes of the map that look like an image, best first; they are tried beside the tracker's own.
+  [[nodiscard]] virtual std::vector<core::KeyframeId> look_alikes(
+      const maps::Map& map, const features::FrameFeatures& image) const = 0;
+  /// True if the image was taken where it was found, and not at a place that looks the same.
+  [[nodiscard]] virtual bool is_place(const maps::Map& map, const LostCamera& lost,
+                                      const FoundFrame& found) const = 0;
+};
+
 class Tracker {
  public:
   Tracker(const TrackerOptions& options, const sensor::Pinhole& camera);
 
   using Features = std::shared_ptr<const features::FrameFeatures>;
-  /// Localises a frame in `map`. An empty map gives kInitialising.
-  TrackResult track(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features);
+  /// Localises a frame in `map`. An empty map gives kInitialising. The local map moves to where a lost camera
+  /// is found by its appearance, if `relocaliser` accepts that; null: always.
+  TrackResult track(const maps::Map& map, Surroundings& around, const sensor::RgbdFrame& frame,
+                    const Features& features, const Relocaliser* relocaliser = nullptr);
 
   /// The same in a map that is not empty, from the motion model alone: a frame that is not found so is lost,
   /// and not looked for by its appearance.
-  TrackResult follow(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features);
+  TrackResult follow(const maps::Map& map, Surroundings& around, const sensor::RgbdFrame& frame,
+                     const Features& features);
 
   /// Sets the readout time from the camera's file (sensor::Camera::readout_s), in place of the option; none:
   /// unchanged. A readout of 0 is a global shutter's.
@@ -113,52 +148,35 @@ class Tracker {
   /// Sets the sensors of the body that carries the camera, asked for each frame; empty: none.
   void set_motion_sensor(MotionSensor sensor) { sensor_ = std::move(sensor); }
 
-  /// Adapts the intensities that are kept of keyframes to a refined camera.
-  void recalibrate(const sensor::Recalibration& change) { photometric_.recalibrate(change); }
-
-  /// Sets the new position of the last pose, because the map has changed or another keyframe becomes the
-  /// reference.
-  void map_changed(const maps::Map& map, core::KeyframeId reference,
-                   const geometry::Rigid3& last_camera_from_world);
-
-  /// Makes the last tracked frame a keyframe: later frames are aligned with its intensities.
-  void add_keyframe(core::KeyframeId id, const sensor::RgbdFrame& frame, const TrackResult& result);
-  [[nodiscard]] const PhotometricKeyframes& photometric() const { return photometric_; }
+  /// Sets the new position of the last pose, because the map has changed.
+  void set_camera_from_world(const geometry::Rigid3& pose) { motion_.set_camera_from_world(pose); }
 
   /// The frame that was just lost was taken at `camera_from_world`, as others know: the motion model begins
   /// there. The result names no reference; the caller makes a keyframe of the frame, and that the reference.
   TrackResult begin_at(const geometry::Rigid3& camera_from_world, const sensor::RgbdFrame& frame,
                        const Features& features);
 
-  /// Continues where another tracker left `map`: it had just tracked the keyframe `reference`, with this
-  /// motion of camera_from_world per second.
-  void restore(const maps::Map& map, core::KeyframeId reference, const geometry::Vector6d& velocity);
-
-  /// Function that finds the keyframes of the map which look like an image, best first. Called when tracking
-  /// is lost, in addition to the tracker's own search.
-  using PlaceFinder = std::function<std::vector<core::KeyframeId>(const features::FrameFeatures&)>;
-  void set_place_finder(PlaceFinder finder) { find_places_ = std::move(finder); }
-
-  /// Function that decides whether a pose that was found by appearance, near `keyframe`, is where the image
-  /// was taken and not a place that looks the same. Called before such a pose is believed; without it every
-  /// pose is.
-  using PlaceJudge =
-      std::function<bool(const sensor::RgbdFrame&, const features::FrameFeatures&, core::KeyframeId keyframe,
-                         const geometry::Rigid3& camera_from_world)>;
-  void set_place_judge(PlaceJudge judge) { is_place_ = std::move(judge); }
+  /// Continues where another tracker stopped that had just tracked this keyframe, with this motion of
+  /// camera_from_world per second.
+  void restore(const maps::Keyframe& keyframe, const geometry::Rigid3& camera_from_world,
+               const geometry::Vector6d& velocity);
 
   /// Pose of the last tracked frame, in the map as it is now.
   [[nodiscard]] const geometry::Rigid3& camera_from_world() const { return motion_.camera_from_world(); }
-  /// True if the last frame and several before it were lost.
-  [[nodiscard]] bool astray() const { return motion_.outdated(); }
+  /// The camera as it is after the last frame: lost, unless its `frames` are 0.
+  [[nodiscard]] LostCamera lost() const {
+    return {motion_.camera_from_world(), motion_.lost_frames(), motion_.outdated()};
+  }
   /// The frames since `lost_frames` were lost are taken back: they are lost, too.
   void take_back(int lost_frames) { motion_.lost_since(lost_frames); }
-  /// Number of frames lost in a row.
-  [[nodiscard]] int lost_frames() const { return motion_.lost_frames(); }
-  [[nodiscard]] core::KeyframeId reference() const { return local_map_.reference; }
-  [[nodiscard]] const LocalMap& local_map() const { return local_map_; }
 
  private:
+  /// The map in which a frame is looked for.
+  struct Scene {
+    const maps::Map& map;
+    Surroundings& around;
+    const Relocaliser* relocaliser;  ///< null: none
+  };
   struct PoseHypotheses {
     std::vector<geometry::Rigid3> camera_from_world;  ///< the likeliest first
     bool searched = false;  ///< the first was searched for in the image: it may be a look-alike
@@ -170,24 +188,25 @@ class Tracker {
   };
 
   [[nodiscard]] TrackResult initialise(const sensor::RgbdFrame& frame, const Features& features);
-  [[nodiscard]] TrackResult lost(const sensor::RgbdFrame& frame);
+  [[nodiscard]] TrackResult missed(const sensor::RgbdFrame& frame);
   [[nodiscard]] TrackedImage image_of(const sensor::RgbdFrame& frame, const Features& features) const;
   void sense(const sensor::RgbdFrame& frame);
-  TrackResult recorded(const TrackedImage& image, TrackResult result);
   /// Tracks from the predicted pose; none if no pose found there can be trusted.
-  [[nodiscard]] std::optional<TrackResult> track_with_motion_model(const maps::Map& map,
+  [[nodiscard]] std::optional<TrackResult> track_with_motion_model(const Scene& scene,
                                                                    const TrackedImage& image) const;
   /// Finds the pose by the image's appearance; the local map moves there.
-  [[nodiscard]] std::optional<TrackResult> relocalise(const maps::Map& map, const TrackedImage& image);
+  [[nodiscard]] std::optional<TrackResult> relocalise(const Scene& scene, const TrackedImage& image);
+  /// The frame's result, lost if there is none.
+  TrackResult concluded(const Scene& scene, const TrackedImage& image, std::optional<TrackResult> found);
   void record(const sensor::RgbdFrame& frame, TrackResult& result);
 
-  [[nodiscard]] PoseHypotheses pose_hypotheses(const maps::Map& map, const sensor::RgbdFrame& frame,
+  [[nodiscard]] PoseHypotheses pose_hypotheses(const Scene& scene, const sensor::RgbdFrame& frame,
                                                const features::FrameFeatures& features) const;
-  void rank_by_intensity(const maps::Map& map, const PhotometricView& view, PoseHypotheses& hypotheses) const;
-  [[nodiscard]] std::vector<PlaceHypothesis> place_hypotheses(const maps::Map& map,
+  void rank_by_intensity(const Scene& scene, const PhotometricView& view, PoseHypotheses& hypotheses) const;
+  [[nodiscard]] std::vector<PlaceHypothesis> place_hypotheses(const Scene& scene,
                                                               const features::FrameFeatures& features) const;
   /// `search_radius_px`: as FrameAligner's.
-  [[nodiscard]] TrackResult align(const maps::Map& map, const TrackedImage& image,
+  [[nodiscard]] TrackResult align(const Scene& scene, const TrackedImage& image,
                                   const geometry::Rigid3& hypothesis, double search_radius_px) const;
   [[nodiscard]] bool jumps(double stamp, const geometry::Rigid3& camera_from_world) const;
   [[nodiscard]] double support(const TrackResult& result) const;
@@ -200,10 +219,6 @@ class Tracker {
   TrackerOptions options_;
   sensor::Pinhole camera_;
   bool global_shutter_ = false;  ///< known to be one
-  LocalMap local_map_;
-  PhotometricKeyframes photometric_;
-  PlaceFinder find_places_;
-  PlaceJudge is_place_;
   MotionModel motion_;
   MotionSensor sensor_;
   cv::Mat thumbnail_;  ///< of the last tracked frame

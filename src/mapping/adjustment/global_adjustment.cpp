@@ -19,8 +19,7 @@ using geometry::Matrix6d;
 using geometry::Rigid3;
 
 /// Information between consecutive keyframes, from tracking. Weaker than landmarks and surfaces: it holds
-/// keyframes that have neither, those taken while turning, and the length of a corridor that nothing else
-/// measures.
+/// keyframes that have neither or were taken while turning, and a corridor's unmeasured length.
 Matrix6d chain_information() { return geometry::information_of(0.01, 0.007); }
 
 /// Builds the bundle of a whole map. Several cameras become one: pixels are carried to the first robot's

@@ -43,6 +43,19 @@ void LocalMapperOptions::declare(core::OptionTable& table) {
   surface.declare(table);
 }
 
+LocalMapper::LocalMapper(const LocalMapperOptions& options, const tracking::TrackerOptions& tracker,
+                         const sensor::Pinhole& camera, std::int32_t robot)
+    : options_(options),
+      camera_(camera),
+      robot_(robot),
+      photometric_(tracker.photometric),
+      local_map_(tracker.local_map),
+      culler_(options.culling) {
+  options_.triangulation.scale_factor = tracker.association.scale_factor;
+  options_.triangulation.aligned = tracker.association.aligned_sigma;
+  options_.edges = options.edges && tracker.depth;
+}
+
 core::KeyframeId LocalMapper::insert(maps::Map& map, const sensor::RgbdFrame& frame,
                                      const tracking::TrackResult& track, const std::vector<cv::Mat>& levels,
                                      bool begins_component) {
@@ -136,10 +149,6 @@ void LocalMapper::add_lines(maps::Map& map, core::KeyframeId id) {
   }
 }
 
-void LocalMapper::count_observations(maps::Map& map, const tracking::TrackResult& track) const {
-  if (!options_.culling.by_keyframes) count(map, track);
-}
-
 void LocalMapper::count(maps::Map& map, const tracking::TrackResult& track) {
   for (core::PointId id : track.visible_points) ++map.point(id).visible;
   for (core::LineId id : track.visible_lines) ++map.line(id).visible;
@@ -147,18 +156,18 @@ void LocalMapper::count(maps::Map& map, const tracking::TrackResult& track) {
   for (const tracking::LineMatch& m : track.lines) ++map.line(m.line).found;
 }
 
-std::optional<SurfaceEdgeJob> LocalMapper::begin_surface_edges(
-    const maps::Map& map, core::KeyframeId id, const cv::Mat& depth, const tracking::TrackResult& track,
-    const tracking::PhotometricKeyframes& photometric, const std::vector<core::KeyframeId>& neighbours,
-    const core::Executor& executor) const {
+std::optional<SurfaceEdgeJob> LocalMapper::begin_surface_edges(const maps::Map& map, core::KeyframeId id,
+                                                               const cv::Mat& depth,
+                                                               const tracking::TrackResult& track,
+                                                               const core::Executor& executor) const {
   if (!options_.edges) return std::nullopt;
 
   std::vector<NeighbourSurface> surfaces;
   const geometry::Rigid3& camera_from_world = map.camera_from_world(id);
-  for (const core::KeyframeId other : neighbours) {
+  for (const core::KeyframeId other : around_.local_map.keyframes) {
     if (other == id) continue;
     surfaces.push_back({&map.keyframe(other), camera_from_world * map.camera_from_world(other).inverse(),
-                        options_.edge_photometric ? photometric.find(other) : nullptr});
+                        options_.edge_photometric ? around_.photometric.find(other) : nullptr});
   }
 
   NewestSurface newest{id, depth, track.depth_from_camera, track.photometric};
@@ -166,9 +175,12 @@ std::optional<SurfaceEdgeJob> LocalMapper::begin_surface_edges(
                         {options_.edge_min_overlap}, executor);
 }
 
-/// True for images taken while turning fast: the rolling shutter distorts them, so their rays are wrong.
-bool LocalMapper::distorted(const maps::Map& map, core::KeyframeId id) const {
-  return map.keyframe(id).turn_rate > options_.max_landmark_turn_rate;
+void LocalMapper::keep_intensities(core::KeyframeId id, const cv::Mat& depth,
+                                   const tracking::TrackResult& track) {
+  if (!photometric_ || track.photometric == nullptr) return;
+  around_.photometric.add(id,
+                          std::make_shared<const features::PhotometricSamples>(features::sample_photometric(
+                              *track.photometric, depth, camera_, track.depth_from_camera.inverse())));
 }
 
 std::vector<core::KeyframeId> LocalMapper::nearest_undistorted(const maps::Map& map, core::KeyframeId id,

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "loop_closing/inter_robot_loops.hpp"
-#include "plumbline/mapping/loop_closing/relocalisation_check.hpp"
+#include "plumbline/mapping/loop_closing/relocalisation.hpp"
 #include "plumbline/maps/components.hpp"
 
 namespace plumbline::mapping {
@@ -42,10 +42,6 @@ void LoopOptions::declare(core::OptionTable& table) {
   vocabulary.declare(table);
   places.declare(table);
   verify.declare(table);
-}
-
-PoseEdge LoopCloser::to_edge(const Loop& loop) {
-  return {loop.match, loop.query, loop.evidence.query_from_match, loop.evidence.information, false};
 }
 
 std::vector<Loop> LoopCloser::verify(const maps::Map& map, KeyframeId keyframe,
@@ -93,11 +89,6 @@ void LoopCloser::note_dispute(const maps::Map& map, KeyframeId keyframe, const s
                         [&](const Loop& x, const Loop& y) { return landmarks(x) < landmarks(y); });
   dispute.strongest.refused = judge(map, dispute.strongest);
   disputes_.push_back(std::move(dispute));
-}
-
-void LoopCloser::clear_pending() {
-  pending_ = PendingLoops();
-  pending_disputes_ = PendingLoops(kDisputePatience);
 }
 
 /// Measures how far closing the loop would move the query, and the length of the path on which that drift may

@@ -62,39 +62,36 @@ void HubMeetings::restart() {
 /// In the job: looks up the keyframes that are new in one robot's map.
 void HubMeetings::search(const std::string& robot, const maps::MapFollower& copy) {
   const std::string head = fmt::format("search {}: {}", ++work_.searches, robot);
-  const auto stored = copy.map();
+  const Robot& known = robots_[robot];
+  const std::size_t number = known.number.value_or(names_.size());
+  auto stored = copy.map(static_cast<std::int32_t>(number));
   if (!stored) {  // rows that belong together are incomplete; more will come
     work_.lines.push_back(head + " waits for more of its rows");
     return;
   }
 
-  const int added = add(robot, *stored);
+  const int added = add(robot, number, *std::move(stored));
   work_.lines.push_back(fmt::format("{} up to transaction {}, {} new keyframes", head, copy.head(), added));
   for (mapping::MeetingEvent& event : server_->finish()) work_.events.push_back(std::move(event));
 }
 
 /// Adds the keyframes of a robot's map that are new. Returns how many.
-int HubMeetings::add(const std::string& robot, const maps::StoredMap& stored) {
-  // Only maps of a single robot take part
+int HubMeetings::add(const std::string& robot, std::size_t number, maps::StoredMap&& stored) {
   Robot& known = robots_[robot];
-  const std::vector<core::KeyframeId> ids = stored.map.keyframe_ids();
-  const auto of_others = [](core::KeyframeId id) { return id.robot != 0; };
-  if (ids.empty() || std::any_of(ids.begin(), ids.end(), of_others)) return 0;  // a map of several robots
+  if (stored.map.keyframe_count() == 0) return 0;
 
-  // Robots are numbered as they come
   if (!known.number) {
-    const auto next = static_cast<std::int32_t>(names_.size());
-    known.number = server_->join({{next, maps::camera_of(stored.header.robots, 0).color}});
+    const sensor::Pinhole camera = maps::camera_of(stored.header.robots, 0).color;
+    known.number = server_->join({{static_cast<std::int32_t>(number), camera}});
     names_.push_back(robot);
   }
 
   // Every new keyframe is searched in the others' maps
-  const auto number = static_cast<std::int32_t>(*known.number);
-  const auto map = std::make_shared<maps::Map>(maps::renumbered(stored.map, {{0, number}}));
+  const auto map = std::make_shared<const maps::Map>(std::move(stored.map));
   int added = 0;
-  for (const core::KeyframeId id : ids) {
+  for (const core::KeyframeId id : map->keyframe_ids()) {
     if (id.index < known.keyframes) continue;
-    server_->add(map, {number, id.index}, work_.searches);
+    server_->add(map, id, work_.searches);
     known.keyframes = id.index + 1;
     ++added;
   }

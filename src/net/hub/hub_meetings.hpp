@@ -46,7 +46,7 @@ class HubMeetings {
   };
   void begin();
   void search(const std::string& robot, const maps::MapFollower& copy);
-  int add(const std::string& robot, const maps::StoredMap& stored);
+  int add(const std::string& robot, std::size_t number, maps::StoredMap&& stored);
   void report();
 
   const core::Executor* executor_;

@@ -65,11 +65,11 @@ core::Result<bool> RobotSession::apply(const RobotStatus& next) {
   const bool has_heads = next.map_head > 0 || next.clouds_head > 0;  // not while it opens its store
   const bool lost = heads.last() > certain_head(next) ||
                     (has_heads && (heads.map > next.map_head || heads.clouds > next.clouds_head));
-  if (next.incarnation > robot.incarnation) roll_back();
+  if (next.incarnation > robot.incarnation) end_transaction();
   robot = next;
   if (!lost) return false;
 
-  roll_back();
+  end_transaction();
   if (auto cleared = copy_->clear(); !cleared) return tl::unexpected(cleared.error());
   done = false;
   return true;
@@ -80,7 +80,7 @@ bool RobotSession::has_all() const {
          copy_->heads().clouds == robot.clouds_head && robot.map_head > 0;
 }
 
-void RobotSession::roll_back() {
+void RobotSession::end_transaction() {
   copy_->roll_back();
   incoming_ = {};
   changed = true;
@@ -97,7 +97,7 @@ core::Result<void> RobotSession::begin(const Chunk& chunk) {
                     robot.name, size / 1000000, quota_bytes_ / 1000000));
   }
 
-  roll_back();
+  end_transaction();
   const auto stream = static_cast<maps::StoreStream>(chunk.stream);
   if (auto begun = copy_->begin(stream, chunk.number); !begun) return begun;
   incoming_.number = chunk.number;
@@ -133,7 +133,7 @@ core::Result<void> RobotSession::receive(const Chunk& chunk) {
   // The last chunk commits the transaction
   const bool last = chunk.index + 1 == chunk.count;
   const core::Result<void> appended = append(chunk, last);
-  if (!appended || last) roll_back();
+  if (!appended || last) end_transaction();
   changed = true;
   return appended;
 }

@@ -70,7 +70,7 @@ class RobotSession {
   RobotSession() = default;
   core::Result<void> begin(const Chunk& chunk);
   core::Result<void> append(const Chunk& chunk, bool last);
-  void roll_back();
+  void end_transaction();
   [[nodiscard]] std::int64_t certain_head(const RobotStatus& next) const;
 
   std::filesystem::path file_;

@@ -68,13 +68,12 @@ void OtherRobots::receive(const Chunk& chunk) {
 /// Leaves the previous map in place while rows that belong together are incomplete.
 void OtherRobots::update(Other& other) {
   if (!other.changed) return;
-  const auto stored = other.follower.map();
+  auto stored = other.follower.map(other.number);
   if (!stored) return;
   other.changed = false;
-  const std::vector<core::KeyframeId> ids = stored->map.keyframe_ids();
-  if (ids.empty() || std::any_of(ids.begin(), ids.end(), [](auto id) { return id.robot != 0; })) return;
+  if (stored->map.keyframe_count() == 0) return;
   auto map = std::make_shared<mapping::OtherMaps>();
-  map->map = maps::renumbered(stored->map, {{0, other.number}});
+  map->map = std::move(stored->map);
   map->cameras = {{other.number, maps::camera_of(stored->header.robots, 0).color}};
   other.map = std::move(map);
 }

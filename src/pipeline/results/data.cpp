@@ -7,6 +7,11 @@
 
 namespace plumbline::pipeline {
 
+const char* to_string(FrameState state) {
+  constexpr const char* kNames[] = {"initialising", "tracked", "lost", "bridged", "located"};
+  return kNames[static_cast<std::size_t>(state)];
+}
+
 core::Result<cloud::CloudPtr> cloud_of(const KeyframeCloud& keyframe) {
   if (keyframe.cloud != nullptr) return keyframe.cloud;
   const auto stored = store_cloud_of(keyframe);

@@ -86,14 +86,14 @@ core::FileNames DebugFolder::files() const {
 
 core::Result<void> write_debug_picture(const fs::path& folder, std::size_t number,
                                        const sensor::RgbdFrame& frame,
-                                       const features::FrameFeatures& features, const mapping::Slam& slam,
+                                       const features::FrameFeatures& features, const maps::Map& map,
                                        const mapping::FrameReport& report, const sensor::Pinhole& camera) {
   sensor::RgbdFrame shown = frame;
   shown.index = static_cast<std::int64_t>(number);  // as in frames.csv
-  tracking::TrackResult track = slam.last_track();
+  tracking::TrackResult track = *report.track;
   // A keyframe has moved with the landmarks when the map was adjusted to it.
-  if (report.keyframe.valid()) track.camera_from_world = slam.map().camera_from_world(report.keyframe);
-  const cv::Mat picture = tracking::draw_overlay(shown, features, track, slam.map(), camera);
+  if (report.keyframe.valid()) track.camera_from_world = map.camera_from_world(report.keyframe);
+  const cv::Mat picture = tracking::draw_overlay(shown, features, track, map, camera);
   return dataset::write_png(folder / picture_name(number), picture);
 }
 

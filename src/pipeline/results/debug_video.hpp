@@ -34,10 +34,10 @@ class DebugFolder {
   std::optional<maps::OutputFolder> own_;  ///< none inside the result folder
 };
 
-/// Writes FOLDER/<number, six digits>.png: `frame` as `slam` has just processed it. Errors are kOutput.
+/// Writes FOLDER/<number, six digits>.png: `frame` as it was tracked in `map`. Errors are kOutput.
 core::Result<void> write_debug_picture(const std::filesystem::path& folder, std::size_t number,
                                        const sensor::RgbdFrame& frame,
-                                       const features::FrameFeatures& features, const mapping::Slam& slam,
+                                       const features::FrameFeatures& features, const maps::Map& map,
                                        const mapping::FrameReport& report, const sensor::Pinhole& camera);
 
 }  // namespace plumbline::pipeline

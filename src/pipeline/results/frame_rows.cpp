@@ -5,8 +5,11 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
+#include <system_error>
 
+#include "plumbline/core/csv.hpp"
 #include "plumbline/core/output_file.hpp"
 
 namespace plumbline::pipeline {
@@ -23,6 +26,11 @@ std::string number(int value) { return std::to_string(value); }
 std::string flag(bool value) { return value ? "1" : "0"; }
 std::string fine(double value) { return fmt::format("{:.4f}", value); }
 std::string degrees(double value) { return fmt::format("{:.2f}", value); }
+
+FrameState state_of(tracking::TrackState state) {
+  if (state == tracking::TrackState::kInitialising) return FrameState::kInitialising;
+  return state == tracking::TrackState::kTracked ? FrameState::kTracked : FrameState::kLost;
+}
 
 /// The share of the bundle's cost that is left.
 double cost_ratio(const mapping::BundleReport& bundle) {
@@ -107,13 +115,40 @@ bool shows_nothing(const sensor::RgbdFrame& frame, std::size_t corners) {
   return depth < kLeastDepth * all || (deviation < kLeastDeviation && corners < kFewCorners);
 }
 
-std::string row_columns(const mapping::FrameReport& report, bool blind) {
-  std::string row;
-  for (const Column& column : kColumns) row += column.text(report) + ",";
-  return row + flag(blind);
+FrameRow row_of(std::size_t frame, const mapping::FrameReport& report, bool shows_nothing,
+                const std::string& robot) {
+  FrameRow row{frame, state_of(report.state), robot.empty() ? "" : core::csv_field(robot) + ","};
+  for (const Column& column : kColumns) row.columns += column.text(report) + ",";
+  row.columns += flag(shows_nothing);
+  row.shows_nothing = shows_nothing;
+  return row;
 }
 
-bool was_blind(const std::string& columns) { return !columns.empty() && columns.back() == '1'; }
+std::string to_line(const FrameRow& row) {
+  return fmt::format("{},{},{}", row.frame, to_string(row.state), row.columns);
+}
+
+std::optional<FrameRow> read_line(const std::string& line) {
+  const std::size_t first = line.find(',');
+  const std::size_t second = line.find(',', first + 1);
+  if (first == std::string::npos || second == std::string::npos) return std::nullopt;
+
+  // The frame's number and its state; the rest stays text.
+  FrameRow row;
+  const char* end = line.data() + first;
+  const auto [stop, error] = std::from_chars(line.data(), end, row.frame);
+  if (error != std::errc() || stop != end) return std::nullopt;
+
+  const std::string state = line.substr(first + 1, second - first - 1);
+  for (const auto known : {FrameState::kInitialising, FrameState::kTracked, FrameState::kLost}) {
+    if (state != to_string(known)) continue;
+    row.state = known;
+    row.columns = line.substr(second + 1);
+    row.shows_nothing = !row.columns.empty() && row.columns.back() == '1';
+    return row;
+  }
+  return std::nullopt;
+}
 
 std::string row_column_names() {
   std::string names;
@@ -129,7 +164,7 @@ core::Result<void> write_frame_rows(const std::filesystem::path& file, const std
   auto row = rows.begin();
   for (std::size_t f = 0; f < frames; ++f) {
     if (row != rows.end() && row->frame == f) {
-      out.write(fmt::format("{},{},{}\n", f, row->state, row->columns));
+      out.write(to_line(*row) + "\n");
       ++row;
     } else {
       out.write(fmt::format("{},unreadable,{}\n", f, nothing));

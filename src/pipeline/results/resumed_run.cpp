@@ -4,12 +4,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <map>
 #include <system_error>
 #include <utility>
 
 #include "plumbline/core/config.hpp"
+#include "results/frame_rows.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -74,18 +74,12 @@ core::Result<void> check_same(const fs::path& file, const char* what, const std:
 core::Result<void> add_rows(const fs::path& file, const std::vector<std::string>& log,
                             std::vector<FrameRow>& rows) {
   for (const std::string& line : log) {
-    const std::size_t first = line.find(',');
-    const std::size_t second = line.find(',', first + 1);
-    FrameRow row;
-    const char* end = line.data() + std::min(first, line.size());
-    const auto [stop, error] = std::from_chars(line.data(), end, row.frame);
-    if (second == std::string::npos || error != std::errc() || stop != end) {
+    auto row = read_line(line);
+    if (!row) {
       return core::input_error(
           fmt::format("{}: its log is damaged; leave out --resume to start again", file.string()));
     }
-    row.state = line.substr(first + 1, second - first - 1);
-    row.columns = line.substr(second + 1);
-    rows.push_back(std::move(row));
+    rows.push_back(*std::move(row));
   }
   return {};
 }
@@ -148,10 +142,6 @@ core::Result<void> check_contents(const fs::path& folder, const std::string& con
   const auto before = values.find("run.contents_of_map");
   return check_same(file, "map", "contents: " + (before == values.end() ? "none" : before->second),
                     "contents: " + contents);
-}
-
-std::string to_line(const FrameRow& row) {
-  return fmt::format("{},{},{}", row.frame, row.state, row.columns);
 }
 
 std::size_t stored_keyframes(const fs::path& folder) {

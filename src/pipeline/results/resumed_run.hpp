@@ -27,9 +27,6 @@ struct ResumedRun {
   std::size_t keyframes = 0;
 };
 
-/// A row as a line of frames.csv.
-std::string to_line(const FrameRow& row);
-
 /// Opens the store of `folder`. None: no keyframe was stored, and the store was removed. kUsage: it was made
 /// with another configuration, recording or camera; the message names the difference. kInput: damaged.
 core::Result<std::optional<ResumedRun>> open_resumed(const std::filesystem::path& folder,

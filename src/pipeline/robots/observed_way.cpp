@@ -8,7 +8,7 @@ void ObservedWay::report(std::size_t number, const mapping::Slam& slam, const ma
   const auto pose_of = [&](const maps::FramePose& frame) {
     return (frame.camera_from_reference * slam.map().camera_from_world(frame.reference)).inverse();
   };
-  LivePose live{number, tracked.stamp, tracked.row.state, std::nullopt, tracked.keyframe};
+  LivePose live{number, tracked.stamp, to_string(tracked.row.state), std::nullopt, tracked.keyframe};
   const bool is_tracked = tracked.pose && tracked.pose->tracked;
   if (is_tracked) live.world_from_camera = pose_of(*tracked.pose);
   observer.processed(live);

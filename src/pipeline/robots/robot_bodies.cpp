@@ -112,7 +112,7 @@ void RobotBodies::bridge(Slams& slams, std::vector<FrameRow>& rows) {
     for (FrameRow& row : rows) {
       const bool own = recordings_.robot_of(row.frame) == robot.number;
       if (!own || numbers.count(recordings_.frame_of(row.frame)) == 0) continue;
-      row.state = "bridged";
+      row.state = FrameState::kBridged;
       ++bridged_;
     }
   }
@@ -154,9 +154,10 @@ void RobotBodies::report(Json& summary) const {
   }
 
   if (!summary.contains("sensors")) return;
-  Json& frames = summary["frames"];
-  frames["bridged"] = bridged_;
-  frames["lost"] = frames["lost"].get<std::size_t>() - bridged_;
+  FrameCounts frames(summary);
+  frames.bridged = bridged_;
+  frames.lost -= bridged_;
+  frames.write(summary);
 }
 
 void report_up(const geometry::Rigid3& output_from_map, Json& summary) {

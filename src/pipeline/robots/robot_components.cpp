@@ -82,8 +82,8 @@ void doubt_components_apart(const Json& summary, std::vector<Doubt>& reasons) {
   }
   if (apart == 0) return;
 
-  const Json& all = summary.at("frames");
-  const double read = all.at("read").get<double>() + all.at("unreadable").get<double>();
+  const FrameCounts all(summary);
+  const auto read = static_cast<double>(all.read + all.unreadable);
   const double percent = read > 0.0 ? 100.0 * frames / read : 0.0;
   const std::string which =
       apart == 1 ? "a second map that shares" : fmt::format("{} more maps that share", apart);

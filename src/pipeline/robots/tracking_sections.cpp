@@ -46,21 +46,23 @@ Json section_of(const mapping::LoopDispute& dispute) {
 }  // namespace
 
 void report_loops(const mapping::Slam& slam, Json& loops) {
-  const mapping::LoopCounts& counts = slam.loop_counts();
+  const mapping::LoopCloser& closer = slam.connections().loops();
+  const mapping::LoopCounts& counts = closer.counts();
   add(loops["candidates"], static_cast<std::size_t>(counts.candidates));
   add(loops["verified"], static_cast<std::size_t>(counts.verified));
   add(loops["accepted"], static_cast<std::size_t>(counts.accepted));
   add(loops["rejected"], static_cast<std::size_t>(counts.rejected));
-  add(loops["relocalisations_taken_back"], static_cast<std::size_t>(slam.taken_back()));
-  for (const mapping::LoopDispute& dispute : slam.disputes())
+  add(loops["relocalisations_taken_back"],
+      static_cast<std::size_t>(slam.connections().components().taken_back()));
+  for (const mapping::LoopDispute& dispute : closer.disputes())
     loops["disputes"].push_back(section_of(dispute));
-  for (const mapping::LoopTrial& trial : slam.loop_trials()) loops["list"].push_back(section_of(trial));
+  for (const mapping::LoopTrial& trial : closer.trials()) loops["list"].push_back(section_of(trial));
 }
 
 void report_joins(const std::string& robot, const mapping::Slam& slam,
                   const std::map<core::KeyframeId, std::size_t>& frames, Json& list) {
   const double first_s = slam.frame_poses().empty() ? 0.0 : slam.frame_poses().front().stamp;
-  for (const mapping::ComponentJoin& join : slam.joins()) {
+  for (const mapping::ComponentJoin& join : slam.connections().components().joins()) {
     ComponentFate component;
     component.name = fmt::format("{}, from keyframe {} on", robot, join.overlap.b.index);
     const auto counted = frames.find(join.overlap.b);
@@ -78,8 +80,9 @@ Json feedback_section(const Slams& slams, const mapping::OtherMapsInbox& others)
   int relocalised = 0;
   int loops = 0;
   for (const auto& slam : slams) {
-    relocalised += slam->loop_counts().located;
-    loops += slam->loop_counts().by_others;
+    const mapping::LoopCounts& counts = slam->connections().loops().counts();
+    relocalised += counts.located;
+    loops += counts.by_others;
   }
   const auto maps = others.get();
   return {{"on", true},

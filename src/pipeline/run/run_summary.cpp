@@ -28,14 +28,25 @@ std::vector<StageTiming> parts_of(const Graph& graph) {
   return parts;
 }
 
-/// Frames read by this run a second, all that is not export included.
-double frames_a_second(const Json& frames, const RunReport& report, const RunFacts& facts) {
-  const double seconds = facts.wall_s - report.export_s;
-  const auto read = frames.at("read").get<std::size_t>() - frames.at("resumed").get<std::size_t>();
-  return seconds > 0.0 ? static_cast<double>(read) / seconds : 0.0;
-}
+/// Time and memory of the run, as the sections `timing` and `memory` have them.
+struct Needs {
+  double wall_s = 0.0, export_s = 0.0, behind_s = 0.0;
+  double fps = 0.0;  ///< frames read by this run a second, all that is not export included
+  double pace_hz = 0.0;
+  double peak_rss_mb = 0.0;
 
-Json timing_of(const Graph& graph, const RunReport& report, const RunFacts& facts, double fps) {
+  Needs(const FrameCounts& frames, const RunReport& report, const RunFacts& facts)
+      : wall_s(rounded(facts.wall_s)),
+        export_s(rounded(report.export_s)),
+        behind_s(rounded(report.behind_s)),
+        pace_hz(rounded(facts.pace_hz)),
+        peak_rss_mb(rounded(pipeline::peak_rss_mb())) {
+    const double seconds = facts.wall_s - report.export_s;
+    if (seconds > 0.0) fps = rounded(static_cast<double>(frames.read - frames.resumed) / seconds);
+  }
+};
+
+Json timing_of(const Graph& graph, const RunReport& report, const RunFacts& facts, const Needs& needs) {
   Json stages = Json::object();
   for (const StageTiming& stage : report.stages) {
     stages[stage.name] = {{"median", rounded(stage.quantile_ms(0.5))},
@@ -52,20 +63,11 @@ Json timing_of(const Graph& graph, const RunReport& report, const RunFacts& fact
                         {"p95", rounded(part.quantile_ms(0.95))}};
   }
 
-  return {{"wall_s", rounded(facts.wall_s)},
-          {"pace_hz", rounded(facts.pace_hz)},
-          {"behind_s", rounded(report.behind_s)},
-          {"map_s", rounded(report.map_s)},
-          {"fps", rounded(fps)},
-          {"export_s", rounded(report.export_s)},
-          {"stages_ms", stages},
-          {"parts_ms", parts},
+  return {{"wall_s", needs.wall_s},     {"pace_hz", needs.pace_hz},
+          {"behind_s", needs.behind_s}, {"map_s", rounded(report.map_s)},
+          {"fps", needs.fps},           {"export_s", needs.export_s},
+          {"stages_ms", stages},        {"parts_ms", parts},
           {"threads", facts.threads}};
-}
-
-double tracked_percent(const Json& frames) {
-  const double all = frames.at("read").get<double>() + frames.at("unreadable").get<double>();
-  return all > 0.0 ? 100.0 * frames.at("tracked").get<double>() / all : 0.0;
 }
 
 /// One line for each robot with sensors beside its camera.
@@ -85,7 +87,7 @@ std::string sensors_text(const Json& summary) {
     }
     text += "\n";
   }
-  const auto bridged = summary.at("frames").at("bridged").get<std::size_t>();
+  const std::size_t bridged = FrameCounts(summary).bridged.value_or(0);
   return bridged > 0 ? text + fmt::format("bridged    {} frames by the gyroscope\n", bridged) : text;
 }
 
@@ -105,42 +107,34 @@ std::string live_text(const Json& live) {
   return text;
 }
 
-std::string time_text(const Json& summary) {
-  const Json& timing = summary.at("timing");
-  const auto seconds = [&](const char* name) { return timing.at(name).get<double>(); };
+std::string text_of(const Needs& needs) {
   std::string text =
       fmt::format("time       {:.1f} s in all, {:.1f} s of it export: {:.1f} frames a second without that\n",
-                  seconds("wall_s"), seconds("export_s"), seconds("fps"));
-
-  if (seconds("pace_hz") > 0.0) {
-    text += fmt::format("pace       {:g} frames a second; {:.2f} s behind at most\n", seconds("pace_hz"),
-                        seconds("behind_s"));
+                  needs.wall_s, needs.export_s, needs.fps);
+  if (needs.pace_hz > 0.0) {
+    text += fmt::format("pace       {:g} frames a second; {:.2f} s behind at most\n", needs.pace_hz,
+                        needs.behind_s);
   }
-
-  text += fmt::format("memory     {:.0f} MB at most\n", summary.at("memory").at("peak_rss_mb").get<double>());
-  return text;
+  return text + fmt::format("memory     {:.0f} MB at most\n", needs.peak_rss_mb);
 }
 
-std::string text_of(const Json& summary) {
-  const Json& frames = summary.at("frames");
+std::string text_of(const Json& summary, const Needs& needs) {
+  const FrameCounts frames(summary);
   const auto count = [](const Json& number) { return number.get<std::size_t>(); };
   std::string text = sentence_of(summary);
   if (!text.empty()) text += "\n";
 
   if (summary.at("stopped").get<bool>()) {
-    text +=
-        fmt::format("stopped after {} of {} frames; what was mapped so far is written\n",
-                    count(frames.at("read")) + count(frames.at("unreadable")), count(frames.at("available")));
+    text += fmt::format("stopped after {} of {} frames; what was mapped so far is written\n",
+                        frames.read + frames.unreadable, frames.available);
   }
 
-  const std::size_t missing = count(frames.at("missing"));
-  text +=
-      fmt::format("frames     {} read, {} tracked ({:.1f} %), {} unreadable{}\n", count(frames.at("read")),
-                  count(frames.at("tracked")), tracked_percent(frames), count(frames.at("unreadable")),
-                  missing > 0 ? fmt::format(", {} missing", missing) : "");
-  if (count(frames.at("odometry")) > 0) {
+  text += fmt::format("frames     {} read, {} tracked ({:.1f} %), {} unreadable{}\n", frames.read,
+                      frames.tracked, frames.tracked_percent(), frames.unreadable,
+                      frames.missing > 0 ? fmt::format(", {} missing", frames.missing) : "");
+  if (frames.odometry > 0) {
     text += fmt::format("poses      of the recorder's own odometry started the search in {} frames\n",
-                        count(frames.at("odometry")));
+                        frames.odometry);
   }
 
   if (summary.contains("sensors")) text += sensors_text(summary);
@@ -152,7 +146,7 @@ std::string text_of(const Json& summary) {
            fmt::format("located    {} frames ({:.1f} %), in a map of {} keyframes; longest gap {} frames\n",
                        count(localized.at("located")), 100.0 * localized.at("share").get<double>(),
                        count(localized.at("keyframes")), count(localized.at("longest_gap"))) +
-           time_text(summary);
+           text_of(needs);
   }
 
   const Json& landmarks = summary.at("landmarks");
@@ -167,7 +161,7 @@ std::string text_of(const Json& summary) {
     if (!without.empty()) text += fmt::format("left out   {}\n", without);
   }
 
-  return text + time_text(summary);
+  return text + text_of(needs);
 }
 
 }  // namespace
@@ -177,13 +171,15 @@ RunSummary summary_of(const Graph& graph, const RunReport& report, const RunFact
   summary["input"] = facts.input;
   summary["pipeline"] = facts.pipeline;
   summary["stopped"] = report.stopped;
-  summary["frames"]["available"] = report.frames_available;
+  FrameCounts frames;
+  frames.available = report.frames_available;
+  frames.write(summary);
   for (const Node& node : graph.nodes) node.stage->report(summary);
 
-  const Json& frames = summary.at("frames");
-  summary["frames"]["tracked_percent"] = rounded(tracked_percent(frames));
-  summary["timing"] = timing_of(graph, report, facts, frames_a_second(frames, report, facts));
-  summary["memory"] = {{"peak_rss_mb", rounded(peak_rss_mb())}};
+  frames = FrameCounts(summary);
+  const Needs needs(frames, report, facts);
+  summary["timing"] = timing_of(graph, report, facts, needs);
+  summary["memory"] = {{"peak_rss_mb", needs.peak_rss_mb}};
   summary["version"] = core::version();
   summary["seed"] = 0;
 
@@ -194,7 +190,7 @@ RunSummary summary_of(const Graph& graph, const RunReport& report, const RunFact
   result.reason = reason_of(summary);
   // Names of files need not be UTF-8: replace what JSON cannot hold.
   result.json = core::json_text(summary);
-  result.text = text_of(summary);
+  result.text = text_of(summary, needs);
   return result;
 }
 

@@ -180,7 +180,7 @@ class CheckStage : public Stage {
   /// Reads the frames again that the continued run had kept: its temporary file is gone.
   void read_again(const ResumedRun& run) {
     for (const FrameRow& row : run.rows) {
-      if (row.state != "tracked") continue;
+      if (row.state != FrameState::kTracked) continue;
       const auto frame = recordings().read(row.frame);
       if (frame) keep(*frame, recordings().robot_of(row.frame));
     }

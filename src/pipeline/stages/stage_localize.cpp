@@ -70,9 +70,11 @@ class LocalizeStage : public Stage {
          {"keyframes", "keyframe_causes", "landmarks", "loops", "refine", "path", "merges", "meetings",
           "robots", "components", "cloud", "frame", "camera", "camera_pairs"})
       summary.erase(of_maps);
-    summary["frames"]["tracked"] = path_.size();
-    summary["frames"]["lost"] = rows_.size() - path_.size();
-    summary["frames"]["longest_loss"] = longest_gap_;
+    FrameCounts frames(summary);
+    frames.tracked = path_.size();
+    frames.lost = rows_.size() - path_.size();
+    frames.longest_loss = longest_gap_;
+    frames.write(summary);
     const bool any = !path_.empty();
     summary["localized"] = {{"located", path_.size()},
                             {"share", rounded(share())},
@@ -102,8 +104,9 @@ class LocalizeStage : public Stage {
     if (!located.located) {
       longest_gap_ = std::max(longest_gap_, ++gap_);
       last_reason_ = located.reason;
-      rows_.push_back({located.number, "lost", text + ",,,,,,,,," + core::csv_field(located.reason)});
-      show({located.number, located.stamp, "lost", std::nullopt, {}, 0.0, 0.0});
+      rows_.push_back(
+          {located.number, FrameState::kLost, text + ",,,,,,,,," + core::csv_field(located.reason)});
+      show({located.number, located.stamp, "lost", std::nullopt, {}});
       return;
     }
 
@@ -111,7 +114,7 @@ class LocalizeStage : public Stage {
     path_.push_back({located.stamp, located.map_from_camera});
     if (located.how == "place") ++places_;
     gap_ = 0;
-    rows_.push_back({located.number, "located",
+    rows_.push_back({located.number, FrameState::kLocated,
                      fmt::format("{},{:.6f},{:.7f},{},{},{},{},{:.4f},{:.4f},", text,
                                  located.sigma_position_m, located.sigma_rotation_rad,
                                  core::csv_field(name_of(located.keyframe.robot)), located.keyframe.index,

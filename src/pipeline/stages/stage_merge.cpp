@@ -152,7 +152,7 @@ class MergeStage : public Stage {
     for (const ComponentFate& component : components_)
       summary["components"]["list"].push_back(section_of(component));
     add(summary["path"]["refused_adjustments"], merged_.refused);
-    if (context_->input.stored_maps != nullptr) report_stored_frames(result, summary["frames"]);
+    if (context_->input.stored_maps != nullptr) report_stored_frames(result, summary);
   }
   void doubt(const Json& summary, std::vector<Doubt>& reasons) const override {
     if (context_->input.stored_maps != nullptr) doubt_lost_frames(summary, reasons);
@@ -163,7 +163,7 @@ class MergeStage : public Stage {
 
  private:
   /// Frames of finished maps are not read; they are counted from their poses.
-  static void report_stored_frames(const MapResult& result, Json& frames) {
+  static void report_stored_frames(const MapResult& result, Json& summary) {
     const auto tracked = std::count_if(result.frame_poses.begin(), result.frame_poses.end(),
                                        [](const auto& frame) { return frame.tracked; });
 
@@ -175,9 +175,11 @@ class MergeStage : public Stage {
       if (counted.insert(component->robots.front().number).second) all += component->frame_poses.size();
     }
 
-    frames["read"] = frames["available"] = all;
-    frames["tracked"] = tracked;
-    frames["lost"] = all - static_cast<std::size_t>(tracked);
+    FrameCounts frames(summary);
+    frames.read = frames.available = all;
+    frames.tracked = static_cast<std::size_t>(tracked);
+    frames.lost = all - frames.tracked;
+    frames.write(summary);
   }
   /// Records the outcome for components that were not joined while their robot mapped.
   void note_components(const std::vector<RobotMap>& parts) {

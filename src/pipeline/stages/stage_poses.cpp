@@ -69,7 +69,7 @@ class PosesStage : public Stage {
     const std::string stamp =
         fmt::format("{}{:.6f}", several() ? core::csv_field(robot.name) + "," : "", frame->stamp);
     if (!pose) {
-      map_.frames.push_back({io.frame(), "lost", stamp + ","});
+      map_.frames.push_back({io.frame(), FrameState::kLost, stamp + ","});
       return {};
     }
 
@@ -87,7 +87,8 @@ class PosesStage : public Stage {
       map_.keyframes.push_back({tracked->keyframe, frame->stamp, *pose});
     }
 
-    map_.frames.push_back({io.frame(), "tracked", stamp + (tracked->keyframe.valid() ? ",1" : ",0")});
+    map_.frames.push_back(
+        {io.frame(), FrameState::kTracked, stamp + (tracked->keyframe.valid() ? ",1" : ",0")});
     io.output<TrackedFrame>("track", tracked);
     return {};
   }
@@ -108,7 +109,9 @@ class PosesStage : public Stage {
 
   [[nodiscard]] bool takes_given_poses() const override { return true; }
   void report(Json& summary) const override {
-    report_frames(map_.frames, summary["frames"]);
+    FrameCounts frames(summary);
+    frames.count(map_.frames);
+    frames.write(summary);
     report_signs(signs_, summary);
     summary["keyframes"] = map_.keyframes.size();
     for (const RobotInfo& robot : map_.robots) {

@@ -110,12 +110,13 @@ class ReadStage : public Stage {
   }
 
   void report(Json& summary) const override {
-    Json& frames = summary["frames"];
-    frames["read"] = read_.load();
-    frames["resumed"] = resumed_;
-    frames["unreadable"] = unreadable_.load();
-    frames["missing"] = source_->missing();
-    frames["odometry"] = odometry_.load();
+    FrameCounts frames(summary);
+    frames.read = read_.load();
+    frames.resumed = resumed_;
+    frames.unreadable = unreadable_.load();
+    frames.missing = source_->missing();
+    frames.odometry = odometry_.load();
+    frames.write(summary);
     if (recordings_ != nullptr && recordings_->live() != nullptr)
       summary["live"] = live_section(recordings_->live()->report());
     report_signs(signs_, summary);

@@ -13,6 +13,7 @@
 #include "plumbline/maps/store.hpp"
 #include "plumbline/maps/stored_maps.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
+#include "results/frame_rows.hpp"
 #include "results/resumed_run.hpp"
 #include "stages/stages.hpp"
 #include "visits/revised_clouds.hpp"

@@ -9,7 +9,6 @@
 #include <optional>
 #include <utility>
 
-#include "plumbline/core/csv.hpp"
 #include "plumbline/mapping/slam.hpp"
 #include "plumbline/pipeline/observer.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
@@ -92,12 +91,14 @@ class TrackStage : public Stage {
     // The pose, and what the frame adds to the map.
     mapping::Slam& slam = *slams_[number];
     const std::size_t poses = slam.frame_poses().size();
-    const int taken_back = slam.taken_back();
+    const mapping::Components& components = slam.connections().components();
+    const int taken_back = components.taken_back();
 
     bodies_->before(robot.number, frame->stamp);
     const mapping::FrameReport report = slam.process(*frame, features);
     bodies_->after(robot.number, slam.frame_poses());
-    if (slam.taken_back() > taken_back) unstored_[number].since = {};  // edges that are stored have changed
+    if (components.taken_back() > taken_back)
+      unstored_[number].since = {};  // edges that are stored have changed
     note(io.frame(), robot, report, shows_nothing(*frame, features->points.size()));
 
     auto tracked = std::make_shared<TrackedFrame>();
@@ -127,7 +128,7 @@ class TrackStage : public Stage {
     cameras_->after(io.frame(), slams_);
     const std::filesystem::path& debug = context_->hooks.debug_folder;
     if (debug.empty()) return {};
-    return write_debug_picture(debug, io.frame(), *frame, *features, slam, report, robot.camera.color);
+    return write_debug_picture(debug, io.frame(), *frame, *features, slam.map(), report, robot.camera.color);
   }
 
   core::Result<void> finish(StageIo& io) override {
@@ -158,11 +159,12 @@ class TrackStage : public Stage {
 
   void report(Json& summary) const override {
     // A dropped component's frames have no pose.
-    Json& frames = summary["frames"];
-    report_frames(rows_, frames);
-    frames["period_s"] = rounded(period_s());
-    frames["tracked"] = frames["tracked"].get<std::size_t>() - dropped_frames_;
-    add(frames["lost"], dropped_frames_);
+    FrameCounts frames(summary);
+    frames.count(rows_);
+    frames.period_s = rounded(period_s());
+    frames.tracked -= dropped_frames_;
+    frames.lost += dropped_frames_;
+    frames.write(summary);
     bodies_->report(summary);
 
     Json& components = summary["components"];
@@ -173,7 +175,7 @@ class TrackStage : public Stage {
       const mapping::Slam& slam = *slams_[static_cast<std::size_t>(robot.number)];
       report_loops(slam, summary["loops"]);
       report_joins(robot.name, slam, component_frames_, components["list"]);
-      add(summary["path"]["refused_adjustments"], static_cast<std::size_t>(slam.refused()));
+      add(summary["path"]["refused_adjustments"], static_cast<std::size_t>(slam.connections().refused()));
       if (several())
         summary["robots"].push_back({{"name", robot.name}, {"keyframes", slam.map().keyframe_count()}});
     }
@@ -204,9 +206,7 @@ class TrackStage : public Stage {
   }
 
   void note(std::size_t frame, const RobotInfo& robot, const mapping::FrameReport& report, bool blind) {
-    const std::string columns = row_columns(report, blind);
-    rows_.push_back({frame, tracking::to_string(report.state),
-                     several() ? core::csv_field(robot.name) + "," + columns : columns});
+    rows_.push_back(row_of(frame, report, blind, several() ? robot.name : ""));
     mark_blind(rows_.size() - 1);
     if (report.keyframe.valid()) ++causes_[report.decision.cause];
     if (report.component.valid()) ++component_frames_[report.component];
@@ -222,7 +222,7 @@ class TrackStage : public Stage {
   void mark_blind(std::size_t row) {
     constexpr std::size_t kFewest = 3;
     std::vector<std::size_t>& run = blind_[recordings().robot_of(rows_[row].frame)];
-    if (rows_[row].state != "tracked" && was_blind(rows_[row].columns))
+    if (rows_[row].state != FrameState::kTracked && rows_[row].shows_nothing)
       run.push_back(row);
     else
       run.clear();
@@ -295,13 +295,6 @@ class TrackStage : public Stage {
       unstored_[number].since = slams_[number]->map().now();
     }
   }
-
-  /// Path of one robot, for observers.
-  struct Way {
-    core::KeyframeId component;       ///< component that is reported
-    std::optional<std::size_t> last;  ///< index of the latest frame pose
-    geometry::Rigid3 odometry_from_camera;
-  };
 
   const RunContext* context_ = nullptr;
   mapping::SlamOptions options_;

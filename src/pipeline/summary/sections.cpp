@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace plumbline::pipeline {
 namespace {
@@ -14,7 +15,51 @@ constexpr double kWorthReporting_percent = 1.0;
 
 const Json kNoSigma = {{"median", nullptr}, {"p90", nullptr}};
 
+constexpr std::pair<const char*, std::size_t FrameCounts::*> kFrameCounts[] = {
+    {"available", &FrameCounts::available}, {"read", &FrameCounts::read},
+    {"resumed", &FrameCounts::resumed},     {"unreadable", &FrameCounts::unreadable},
+    {"missing", &FrameCounts::missing},     {"odometry", &FrameCounts::odometry},
+    {"tracked", &FrameCounts::tracked},     {"lost", &FrameCounts::lost},
+    {"blind", &FrameCounts::blind},         {"longest_loss", &FrameCounts::longest_loss}};
+
+Json section_of(const FrameCounts& counts) {
+  Json frames;
+  for (const auto& [key, member] : kFrameCounts) {
+    if (member == &FrameCounts::longest_loss) frames["period_s"] = counts.period_s;
+    frames[key] = counts.*member;
+  }
+  frames["tracked_percent"] = rounded(counts.tracked_percent());
+  if (counts.bridged) frames["bridged"] = *counts.bridged;
+  return frames;
+}
+
 }  // namespace
+
+FrameCounts::FrameCounts(const Json& summary) {
+  const Json& frames = summary.at("frames");
+  for (const auto& [key, member] : kFrameCounts) this->*member = frames.at(key).get<std::size_t>();
+  period_s = frames.at("period_s").get<double>();
+  if (frames.contains("bridged")) bridged = frames.at("bridged").get<std::size_t>();
+}
+
+void FrameCounts::write(Json& summary) const { summary["frames"] = section_of(*this); }
+
+void FrameCounts::count(const std::vector<FrameRow>& rows) {
+  tracked = lost = blind = longest_loss = 0;
+  std::size_t loss = 0;
+  for (const FrameRow& row : rows) {
+    const bool is_tracked = row.state == FrameState::kTracked;
+    ++(is_tracked ? tracked : lost);
+    blind += row.blind ? 1U : 0U;
+    loss = is_tracked ? 0 : loss + 1;
+    longest_loss = std::max(longest_loss, loss);
+  }
+}
+
+double FrameCounts::tracked_percent() const {
+  const auto all = static_cast<double>(read + unreadable);
+  return all > 0.0 ? 100.0 * static_cast<double>(tracked) / all : 0.0;
+}
 
 Json empty_sections() {
   const Json none = Json::array();
@@ -26,19 +71,7 @@ Json empty_sections() {
           {"unchecked", none},
           {"signs", none},
           {"stopped", false},
-          {"frames",
-           {{"available", 0},
-            {"read", 0},
-            {"resumed", 0},
-            {"unreadable", 0},
-            {"missing", 0},
-            {"odometry", 0},
-            {"tracked", 0},
-            {"lost", 0},
-            {"blind", 0},
-            {"period_s", 0.0},
-            {"longest_loss", 0},
-            {"tracked_percent", 0.0}}},
+          {"frames", section_of(FrameCounts())},
           {"keyframes", 0},
           {"keyframe_causes", {{"cone", 0}, {"urgent", 0}, {"plain", 0}}},
           {"landmarks", {{"points", 0}, {"lines", 0}}},
@@ -95,21 +128,6 @@ Json section_of(const Sigma& sigma) {
 
 void add(Json& number, std::size_t more) { number = number.get<std::size_t>() + more; }
 
-void report_frames(const std::vector<FrameRow>& rows, Json& frames) {
-  std::size_t tracked = 0, lost = 0, blind = 0, loss = 0, longest_loss = 0;
-  for (const FrameRow& row : rows) {
-    const bool is_tracked = row.state == "tracked";
-    ++(is_tracked ? tracked : lost);
-    blind += row.blind ? 1U : 0U;
-    loss = is_tracked ? 0 : loss + 1;
-    longest_loss = std::max(longest_loss, loss);
-  }
-  frames["tracked"] = tracked;
-  frames["lost"] = lost;
-  frames["blind"] = blind;
-  frames["longest_loss"] = longest_loss;
-}
-
 Json left_out_section(const std::vector<std::pair<std::string, std::size_t>>& left_out) {
   Json list = Json::array();
   for (const auto& [by, points] : left_out) list.push_back({{"by", by}, {"points", points}});
@@ -142,11 +160,9 @@ std::string left_out_of_map_text(const Json& cloud) {
 }
 
 void doubt_lost_frames(const Json& summary, std::vector<Doubt>& reasons) {
-  const Json& frames = summary.at("frames");
-  const auto count = [&](const char* name) { return frames.at(name).get<std::size_t>(); };
-  const std::size_t missing = count("missing");
-  const std::size_t every = count("read") + count("unreadable") + missing;
-  const std::size_t blind = std::min(every, count("blind"));
+  const FrameCounts frames(summary);
+  const std::size_t every = frames.read + frames.unreadable + frames.missing;
+  const std::size_t blind = std::min(every, frames.blind);
 
   if (2 * blind > every) {
     reasons.push_back(
@@ -158,22 +174,22 @@ void doubt_lost_frames(const Json& summary, std::vector<Doubt>& reasons) {
 
   // Frames that showed nothing could not be tracked by anything.
   const std::size_t all = every - blind;
-  const std::size_t without = all - std::min(all, count("tracked"));
+  const std::size_t without = all - std::min(all, frames.tracked);
 
   const double percent = all > 0 ? 100.0 * static_cast<double>(without) / static_cast<double>(all) : 0.0;
   if (percent <= kMostLostPercent) return;
-  const std::string none = missing > 0 ? fmt::format(", {} without files", missing) : "";
+  const std::string none = frames.missing > 0 ? fmt::format(", {} without files", frames.missing) : "";
   reasons.push_back(
       {Doubt::About::kLostFrames, fmt::format("{} of {} frames have no pose ({:.1f} %; up to {:.0f} % would "
                                               "be trusted): {} lost, {} unreadable{}; "
                                               "the longest loss is {} frames",
-                                              without, all, percent, kMostLostPercent, count("lost") - blind,
-                                              count("unreadable"), none, count("longest_loss"))});
+                                              without, all, percent, kMostLostPercent, frames.lost - blind,
+                                              frames.unreadable, none, frames.longest_loss)});
 }
 
 void doubt_empty_cloud(const Json& summary, std::vector<Doubt>& reasons) {
   const Json& cloud = summary.at("cloud");
-  if (summary.at("frames").at("read").get<std::size_t>() == 0) return;
+  if (FrameCounts(summary).read == 0) return;
   if (!(cloud.at("voxel_m").get<double>() > 0.0) || cloud.at("points").get<std::size_t>() > 0) return;
   const std::string of_map = left_out_of_map_text(cloud);
   const std::string without = of_map.empty() ? left_out_text(cloud) : of_map;

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -42,8 +43,22 @@ Json section_of(const Sigma& sigma);
 /// Adds to a number of a section.
 void add(Json& number, std::size_t more);
 
-/// Tracked and lost frames and the longest run of lost ones, for the section `frames`.
-void report_frames(const std::vector<FrameRow>& rows, Json& frames);
+/// The section `frames`.
+struct FrameCounts {
+  std::size_t available = 0;
+  std::size_t read = 0, resumed = 0, unreadable = 0, missing = 0;
+  std::size_t odometry = 0;  ///< with a pose of the recorder's own
+  std::size_t tracked = 0, lost = 0, blind = 0, longest_loss = 0;
+  std::optional<std::size_t> bridged;  ///< none: without sensors of the body
+  double period_s = 0.0;
+
+  FrameCounts() = default;
+  explicit FrameCounts(const Json& summary);
+  void write(Json& summary) const;
+  /// Counts what became of the frames that were read.
+  void count(const std::vector<FrameRow>& rows);
+  [[nodiscard]] double tracked_percent() const;
+};
 
 /// Points that filters left out, by the filter's type.
 Json left_out_section(const std::vector<std::pair<std::string, std::size_t>>& left_out);

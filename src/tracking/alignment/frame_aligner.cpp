@@ -122,7 +122,7 @@ void FrameAligner::match_landmarks(const AlignmentRound& round) {
   result_.doubtful.clear();
 
   if (in_.options.points) {
-    result_.points = match_points(in_.map, in_.local_map.points, {features(), in_.camera, pose}, radius, how,
+    result_.points = match_points(in_.map, in_.around.local_map.points, {features(), in_.camera, pose}, radius, how,
                                   &result_.visible_points);
 
     // Corners are aligned once outliers are rejected
@@ -132,7 +132,7 @@ void FrameAligner::match_landmarks(const AlignmentRound& round) {
   }
 
   if (in_.options.lines) {
-    result_.lines = match_lines(in_.map, in_.local_map.lines, {features(), in_.camera, pose}, radius, how,
+    result_.lines = match_lines(in_.map, in_.around.local_map.lines, {features(), in_.camera, pose}, radius, how,
                                 &result_.visible_lines);
     problem_.lines = line_terms(in_.map, result_.lines, features(), kLineSigma_px);
   }
@@ -146,7 +146,7 @@ void FrameAligner::associate_surface(const AlignmentRound& round) {
   how.max_distance_m = round.max_plane_distance_m;
   how.max_samples = round.surface_samples;
   problem_.planes = tracking::associate_surface(
-      in_.local_map.surface,
+      in_.around.local_map.surface,
       {frame().depth, in_.camera, result_.camera_from_world, motion_.depth_from_camera}, how,
       &result_.surface_in_view);
 }
@@ -158,8 +158,8 @@ void FrameAligner::associate_intensity(const AlignmentRound& round) {
   const bool again = intensity_level_ == round.pyramid_level && problem_.photometric &&
                      update_photometric(*problem_.photometric, result_.camera_from_world);
   if (!again) {
-    problem_.photometric = in_.photometric.associate(
-        in_.map, in_.local_map.keyframes, round.pyramid_level,
+    problem_.photometric = in_.around.photometric.associate(
+        in_.map, in_.around.local_map.keyframes, round.pyramid_level,
         {features().photometric.get(), &frame().depth, motion_.depth_from_camera, in_.camera},
         result_.camera_from_world);
   }

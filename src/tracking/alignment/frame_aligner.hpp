@@ -16,8 +16,7 @@ struct AlignmentInput {
   const TrackerOptions& options;
   const sensor::Pinhole& camera;
   const maps::Map& map;
-  const LocalMap& local_map;
-  const PhotometricKeyframes& photometric;
+  const Surroundings& around;
   const MotionModel& motion;
   const TrackedImage& image;
   double depth_delay_s = 0.0;  ///< of the depth image after the colour image's stamp

@@ -83,7 +83,7 @@ class HardWalk {
       }
     }
     slam.finish();
-    trajectory = slam.trajectory();
+    trajectory = maps::trajectory(slam.frame_poses(), slam.map());
   }
 };
 

@@ -103,7 +103,7 @@ SlamRun run(const std::vector<Shot>& shots, int threads = 1, const SlamOptions& 
   }
   slam.finish();
   result.landmarks = landmarks_of(slam.map());
-  result.trajectory = slam.trajectory();
+  result.trajectory = maps::trajectory(slam.frame_poses(), slam.map());
   result.keyframes = maps::keyframe_trajectory(slam.map());
   result.lines = maps::line_segments(slam.map());
   result.points = slam.map().point_count();
@@ -229,7 +229,7 @@ TEST(Slam, EveryFrameKnowsItsStepAndEveryKeyframeItsWay) {
   EXPECT_FALSE(slam.map().keyframe(ids[0]).reference.valid());
   for (std::size_t i = 1; i < ids.size(); ++i)
     EXPECT_TRUE(slam.map().keyframe(ids[i]).reference.valid()) << i;
-  EXPECT_EQ(slam.refused(), 0);
+  EXPECT_EQ(slam.connections().refused(), 0);
   const maps::PathCheck check = maps::check_path(frames, slam.map());
   EXPECT_TRUE(check.tears.empty());
   EXPECT_GT(check.largest_m, 0.0) << "bundles do move keyframes";
@@ -370,7 +370,7 @@ TEST(Slam, GoesOnWhereAnotherOneStopped) {
     if (report.keyframe.valid()) ++keyframes;
   }
   second.finish();
-  const geometry::Trajectory trajectory = second.trajectory();
+  const geometry::Trajectory trajectory = maps::trajectory(second.frame_poses(), second.map());
   ASSERT_EQ(trajectory.size(), whole.trajectory.size());
   EXPECT_LT(ate(trajectory, recording.truth), 0.005);
   for (std::size_t i = 0; i < trajectory.size(); ++i) {

@@ -164,7 +164,7 @@ TEST(SurfaceEdge, WithoutOverlapThereIsNone) {
 /// A keyframe's surface is where its colour camera was: what its depth camera measured later is carried back.
 TEST(SurfaceEdge, AKeyframesSurfaceIsThatOfItsColourImage) {
   const Rigid3 later(geometry::exp_so3({0.0, 0.02, 0.0}), Eigen::Vector3d(0.02, 0.0, -0.03));
-  LocalMapper mapper({}, kSurfaceCamera, 0);
+  LocalMapper mapper({}, {}, kSurfaceCamera, 0);
   maps::Map map;
   sensor::RgbdFrame frame;
   frame.depth = look(kCorner, later, 3);

@@ -12,6 +12,7 @@
 
 #include "hot_journal.hpp"
 #include "plumbline/cloud/compact/compact_cloud.hpp"
+#include "plumbline/maps/map_join.hpp"
 #include "plumbline/maps/store.hpp"
 #include "plumbline/maps/store_replica.hpp"
 #include "store_dump.hpp"
@@ -110,6 +111,28 @@ TEST(StoreReplica, HoldsTheSameRowsWheneverItCaughtUp) {
   EXPECT_GT(copy->bytes().place, 0U);
   EXPECT_GT(copy->bytes().map, 0U);
   EXPECT_GT(copy->bytes().cloud, 0U);
+}
+
+TEST(MapFollower, GivesItsOnlyRobotAnotherNumber) {
+  for (const int other : {0, 3}) {
+    const StoreFolder folder;
+    StoreWorld world(33);
+    world.other_robot = other;
+    auto writer = StoreWriter::create(folder.file(), header_of(world.camera));
+    ASSERT_TRUE(writer) << writer.error().message;
+    auto copy = StoreReplica::open(folder.path / "copy.db");
+    ASSERT_TRUE(copy) << copy.error().message;
+    for (int i = 0; i < 6; ++i)
+      ASSERT_TRUE(writer->add_keyframe(world.map, world.step(), small_cloud(i), world.frames));
+    follow(folder.file(), *copy);
+
+    const auto map = copy->map().map(7);
+    ASSERT_EQ(map.has_value(), other == 0) << "of several robots none has another number";
+    EXPECT_TRUE(equal(copy->map().map()->map, world.map));
+    if (!map) continue;
+    EXPECT_TRUE(equal(map->map, renumbered(world.map, {{0, 7}})));
+    EXPECT_EQ(map->frames.front().reference.robot, 7);
+  }
 }
 
 TEST(MapFollower, HasTheMapOfTheStoreAtEachMomentAndKeepsWhatItDecoded) {

@@ -83,6 +83,25 @@ TrackerOptions only(bool points, bool lines, bool depth) {
   return options;
 }
 
+/// Believes every place, or none.
+class Judge : public Relocaliser {
+ public:
+  explicit Judge(bool believes) : believes_(believes) {}
+  [[nodiscard]] std::vector<core::KeyframeId> look_alikes(
+      const maps::Map& /*map*/, const features::FrameFeatures& /*image*/) const override {
+    return {};
+  }
+  [[nodiscard]] bool is_place(const maps::Map& /*map*/, const LostCamera& /*lost*/,
+                              const FoundFrame& found) const override {
+    asked.emplace_back(found.keyframe, found.camera_from_world);
+    return believes_;
+  }
+  mutable std::vector<std::pair<core::KeyframeId, Rigid3>> asked;
+
+ private:
+  bool believes_;
+};
+
 /// Two places in one map; the camera was last seen at the first.
 class TwoPlaces : public testing::Test {
  protected:
@@ -91,9 +110,9 @@ class TwoPlaces : public testing::Test {
     there_ = add_keyframe(map_, look_at(second_, {}), away_);
   }
   TrackResult track(const TrackerOptions& options, const Look& seen) {
-    Tracker tracker(options, kTestCamera);
-    tracker.map_changed(map_, here_, {});
-    return tracker.track(map_, seen.frame, std::make_shared<features::FrameFeatures>(seen.features));
+    Surroundings around{build_local_map(map_, here_, options.local_map), {}};
+    return Tracker(options, kTestCamera)
+        .track(map_, around, seen.frame, std::make_shared<features::FrameFeatures>(seen.features));
   }
 
   cv::Mat first_ = blocks(4);
@@ -145,20 +164,18 @@ TEST_F(TwoPlaces, APlaceThatTheJudgeRefusesIsNotTaken) {
   const Rigid3 moved(geometry::exp_so3({0.01, 0.02, 0.01}), {0.02, 0.01, 0.02});
   const Look seen = look_at(second_, moved);
   for (const bool believed : {true, false}) {
-    Tracker tracker(only(true, true, true), kTestCamera);
-    tracker.map_changed(map_, here_, Rigid3());
-    int asked = 0;
-    tracker.set_place_judge([&](const sensor::RgbdFrame&, const features::FrameFeatures&,
-                                core::KeyframeId keyframe, const Rigid3& pose) {
-      ++asked;
+    const Judge judge(believed);
+    Surroundings around{build_local_map(map_, here_, {}), {}};
+    const TrackResult result = Tracker(only(true, true, true), kTestCamera)
+                                   .track(map_, around, seen.frame,
+                                          std::make_shared<features::FrameFeatures>(seen.features), &judge);
+    ASSERT_FALSE(judge.asked.empty());
+    for (const auto& [keyframe, pose] : judge.asked) {
       EXPECT_EQ(keyframe, there_);
       EXPECT_LT(tests::distance(pose, moved * away_), 0.005);
-      return believed;
-    });
-    const TrackResult result =
-        tracker.track(map_, seen.frame, std::make_shared<features::FrameFeatures>(seen.features));
-    EXPECT_GE(asked, 1);
+    }
     EXPECT_EQ(result.state, believed ? TrackState::kTracked : TrackState::kLost);
+    EXPECT_EQ(around.local_map.reference, believed ? there_ : here_);
   }
 }
 
@@ -211,12 +228,13 @@ double fallen(const std::vector<tests::WorldPlane>& others) {
   Tracker tracker({}, kTestCamera);
   geometry::Vector6d velocity = geometry::Vector6d::Zero();
   velocity(1) = -0.15;
-  tracker.restore(map, id, velocity);
+  tracker.restore(map.keyframe(id), {}, velocity);
+  Surroundings around{build_local_map(map, id, {}), {}};
   double y = 0.0;
   for (int i = 1; i <= 20; ++i) {
     seen.frame.stamp = seen.frame.depth_stamp = i / 30.0;
     const TrackResult result =
-        tracker.track(map, seen.frame, std::make_shared<features::FrameFeatures>(seen.features));
+        tracker.track(map, around, seen.frame, std::make_shared<features::FrameFeatures>(seen.features));
     EXPECT_EQ(result.state, TrackState::kTracked) << i;
     y = result.camera_from_world.inverse().translation.y();
   }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Turns frames into keyframes and keeps the landmarks worth having (docs/method/mapping.md).
+// Turns frames into keyframes, keeps the landmarks worth having (docs/method/mapping.md), and knows what of
+// the map is around the camera.
 #include <memory>
 #include <optional>
 #include <vector>
@@ -49,11 +50,26 @@ struct LocalMapperOptions {
 
 class LocalMapper {
  public:
-  LocalMapper(const LocalMapperOptions& options, const sensor::Pinhole& camera, std::int32_t robot)
-      : options_(options), camera_(camera), robot_(robot), culler_(options.culling) {}
+  /// `tracker`: whose frames these are; its corners are as exact when triangulated as when tracked.
+  LocalMapper(const LocalMapperOptions& options, const tracking::TrackerOptions& tracker,
+              const sensor::Pinhole& camera, std::int32_t robot);
 
   /// Continues with the `map` of another mapper, whose newest keyframe is `newest`.
-  void restore(const maps::Map& map, core::KeyframeId newest) { culler_.restore(map, newest); }
+  void restore(const maps::Map& map, core::KeyframeId newest) {
+    culler_.restore(map, newest);
+    look_around(map, newest);
+  }
+
+  /// The map around the camera, for its tracker.
+  [[nodiscard]] tracking::Surroundings& around() { return around_; }
+  /// Keyframe that the camera is near.
+  [[nodiscard]] core::KeyframeId reference() const { return around_.local_map.reference; }
+  /// Takes the local map anew, because the map has changed or another keyframe becomes the reference.
+  void look_around(const maps::Map& map, core::KeyframeId reference) {
+    around_.local_map = tracking::build_local_map(map, reference, local_map_);
+  }
+  /// Adapts the intensities that are kept of keyframes to a refined camera.
+  void recalibrate(const sensor::Recalibration& change) { around_.photometric.recalibrate(change); }
 
   /// Adds a keyframe: observations of the landmarks it tracked, new landmarks from its depth, where older
   /// keyframes saw these, and landmarks without depth, triangulated. `levels`: the pyramid of its image;
@@ -62,15 +78,21 @@ class LocalMapper {
                           const std::vector<cv::Mat>& levels, bool begins_component = false);
 
   /// Counts which landmarks a tracked frame should have seen and did; not where keyframes alone count.
-  void count_observations(maps::Map& map, const tracking::TrackResult& track) const;
+  void count_observations(maps::Map& map, const tracking::TrackResult& track) const {
+    if (!options_.culling.by_keyframes) count(map, track);
+  }
 
-  /// Starts to align the surfaces of neighbouring keyframes, and their grey values if available, with the
+  /// Starts to align the surfaces of the keyframes around, and their grey values if available, with the
   /// depth image and the image of the new one: the resulting constraints on its pose become edges of the map.
   /// None without the option `edges`.
-  [[nodiscard]] std::optional<SurfaceEdgeJob> begin_surface_edges(
-      const maps::Map& map, core::KeyframeId keyframe, const cv::Mat& depth,
-      const tracking::TrackResult& track, const tracking::PhotometricKeyframes& photometric,
-      const std::vector<core::KeyframeId>& neighbours, const core::Executor& executor) const;
+  [[nodiscard]] std::optional<SurfaceEdgeJob> begin_surface_edges(const maps::Map& map,
+                                                                  core::KeyframeId keyframe,
+                                                                  const cv::Mat& depth,
+                                                                  const tracking::TrackResult& track,
+                                                                  const core::Executor& executor) const;
+
+  /// Keeps the intensities of a new keyframe: later frames are aligned with them.
+  void keep_intensities(core::KeyframeId keyframe, const cv::Mat& depth, const tracking::TrackResult& track);
 
   /// Improves the map around a new keyframe: first duplicate landmarks are fused, then those that did not
   /// prove themselves are removed.
@@ -81,13 +103,19 @@ class LocalMapper {
   void add_points(maps::Map& map, core::KeyframeId keyframe, const cv::Mat& depth);
   void add_lines(maps::Map& map, core::KeyframeId keyframe);
   void triangulate(maps::Map& map, core::KeyframeId keyframe, const NewestImage& image);
-  [[nodiscard]] bool distorted(const maps::Map& map, core::KeyframeId keyframe) const;
+  /// True for images taken while turning fast: the rolling shutter distorts them, so their rays are wrong.
+  [[nodiscard]] bool distorted(const maps::Map& map, core::KeyframeId keyframe) const {
+    return map.keyframe(keyframe).turn_rate > options_.max_landmark_turn_rate;
+  }
   [[nodiscard]] std::vector<core::KeyframeId> nearest_undistorted(const maps::Map& map,
                                                                   core::KeyframeId keyframe, int count) const;
 
   LocalMapperOptions options_;
   sensor::Pinhole camera_;
   std::int32_t robot_;
+  bool photometric_;
+  tracking::LocalMapOptions local_map_;
+  tracking::Surroundings around_;
   LandmarkCuller culler_;
 };
 

@@ -129,10 +129,15 @@ class LoopCloser {
   bool close(maps::Map& map, const std::vector<PoseEdge>& edges);
 
   /// Drops loops that wait for others to agree with them: they were measured with another camera.
-  void clear_pending();
+  void clear_pending() {
+    pending_ = PendingLoops();
+    pending_disputes_ = PendingLoops(kDisputePatience);
+  }
 
   /// The loop as an edge of the pose graph: the pose of the query relative to the match.
-  static PoseEdge to_edge(const Loop& loop);
+  static PoseEdge to_edge(const Loop& loop) {
+    return {loop.match, loop.query, loop.evidence.query_from_match, loop.evidence.information, false};
+  }
 
   /// Keyframes of the map that an image looks like, best first; for a tracker that is lost.
   [[nodiscard]] std::vector<core::KeyframeId> look_alikes(const maps::Map& map,
