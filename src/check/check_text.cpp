@@ -55,7 +55,9 @@ std::string to_text(const CheckReport& report) {
   };
   line("expected error", fmt::format("{}, 95 %: {}", mm(report.expected_m), mm(report.p95_m)));
   if (report.drift_m > 0.0)
-    line("drift", mm(report.drift_m) + " over the whole path: nothing was seen twice");
+    line("drift", fmt::format("{}: nothing was seen twice on {:.1f} of {:.1f} m", mm(report.drift_m),
+                              report.untied_m, report.path_m));
+  if (report.camera_m > 0.0) line("camera's uncertainty", mm(report.camera_m));
   line("told by the estimate", report.told_m > 0.0 ? mm(report.told_m) : "nothing");
 
   line("graph of corrections", fmt::format("{} RMS over {} frames", mm(report.graph_m), report.anchors));
@@ -104,6 +106,8 @@ std::string to_json(const CheckReport& report) {
                     {"reasons", report.reasons},
                     {"unchecked", report.unchecked},
                     {"told_m", rounded_m(report.told_m)},
+                    {"camera_m", rounded_m(report.camera_m)},
+                    {"untied_m", rounded_m(report.untied_m)},
                     {"drift_m", rounded_m(report.drift_m)},
                     {"graph_m", rounded_m(report.graph_m)},
                     {"align", align},

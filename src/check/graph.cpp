@@ -75,24 +75,15 @@ class Equations {
     return draws;
   }
 
-  /// Motion of an anchor about the world's origin, less that of the path as a whole.
-  [[nodiscard]] std::vector<Vector6d> without_whole(const Eigen::VectorXd& x) const {
-    std::vector<Eigen::Vector3d> before, after;
-    for (std::size_t a = 0; a < anchors_.size(); ++a) {
-      before.push_back(anchors_[a].world_from_camera.translation);
-      after.push_back(moved(a, x));
-    }
-    const Rigid3 whole = geometry::align_points(before, after);
-    const Eigen::Vector3d turn = geometry::log_so3(whole.rotation);
-
-    std::vector<Vector6d> motions;
+  /// Motions of the anchors about the world's origin.
+  [[nodiscard]] std::vector<Vector6d> motions(const Eigen::VectorXd& x) const {
+    std::vector<Vector6d> all;
     for (std::size_t a = 0; a < anchors_.size(); ++a) {
       Vector6d motion = of(x, a);
-      motion.tail<3>() -= turn;
-      motion.head<3>() = after[a] - whole * before[a] - motion.tail<3>().cross(before[a]);
-      motions.push_back(motion);
+      motion.head<3>() -= motion.tail<3>().cross(middle_);
+      all.push_back(motion);
     }
-    return motions;
+    return all;
   }
 
   /// Weight of Geman and McClure.
@@ -164,6 +155,22 @@ class Equations {
 
 }  // namespace
 
+std::vector<Vector6d> without_whole(const std::vector<GraphAnchor>& anchors, std::vector<Vector6d> motions) {
+  std::vector<Eigen::Vector3d> before, after;
+  for (std::size_t a = 0; a < anchors.size(); ++a) {
+    before.push_back(anchors[a].world_from_camera.translation);
+    after.emplace_back(before[a] + motions[a].head<3>() + motions[a].tail<3>().cross(before[a]));
+  }
+  const Rigid3 whole = geometry::align_points(before, after);
+  const Eigen::Vector3d turn = geometry::log_so3(whole.rotation);
+
+  for (std::size_t a = 0; a < anchors.size(); ++a) {
+    motions[a].tail<3>() -= turn;
+    motions[a].head<3>() = after[a] - whole * before[a] - motions[a].tail<3>().cross(before[a]);
+  }
+  return motions;
+}
+
 GraphReport put_together(const std::vector<GraphAnchor>& anchors, const std::vector<PairLink>& links) {
   GraphReport report;
   report.weight.assign(links.size(), 1.0);
@@ -192,13 +199,13 @@ GraphReport put_together(const std::vector<GraphAnchor>& anchors, const std::vec
   report.rms_m = std::sqrt(sum / static_cast<double>(anchors.size()));
 
   // The path keeps its place in what was found, and in draws of what may remain.
-  report.found = equations.without_whole(found);
+  report.found = without_whole(anchors, equations.motions(found));
   report.draws.resize(anchors.size());
   const Eigen::MatrixXd draws = equations.draw(report.weight);
   double squares = 0.0;
 
   for (Eigen::Index s = 0; s < draws.cols(); ++s) {
-    const std::vector<Vector6d> motions = equations.without_whole(draws.col(s));
+    const std::vector<Vector6d> motions = without_whole(anchors, equations.motions(draws.col(s)));
     for (std::size_t a = 0; a < anchors.size(); ++a) {
       const Eigen::Vector3d& at = anchors[a].world_from_camera.translation;
       squares += (motions[a].head<3>() + motions[a].tail<3>().cross(at)).squaredNorm();

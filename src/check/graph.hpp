@@ -33,6 +33,10 @@ struct GraphReport {
   double draws_rms_m = 0.0;  ///< of the anchors' shifts in these
 };
 
+/// Motions of the anchors about the world's origin, less that of the path as a whole.
+std::vector<geometry::Vector6d> without_whole(const std::vector<GraphAnchor>& anchors,
+                                              std::vector<geometry::Vector6d> motions);
+
 /// Anchors are by way, in order. Fewer than three, or no link: an empty report.
 GraphReport put_together(const std::vector<GraphAnchor>& anchors, const std::vector<PairLink>& links);
 

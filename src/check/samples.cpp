@@ -16,10 +16,20 @@ using geometry::PoseSamples;
 using geometry::Vector6d;
 
 constexpr std::uint64_t kSeedOfSigns = 32;
+/// Draws of the graph turn cameras by more than they are turned, for how far they shift them.
+constexpr double kTurns = 0.5;
 
-/// Numbers of mean square 1.
-std::array<double, geometry::kPoseSamples> factors() {
-  core::SplitMix random(kSeedOfSigns);
+/// The motion that shifts a place alike and turns it less.
+Vector6d less_turned(const Vector6d& motion, const Eigen::Vector3d& at) {
+  Vector6d less = kTurns * motion;
+  less.head<3>() += (1.0 - kTurns) * (motion.head<3>() + motion.tail<3>().cross(at));
+  return less;
+}
+
+}  // namespace
+
+std::array<double, geometry::kPoseSamples> factors_of(std::size_t number) {
+  core::SplitMix random(kSeedOfSigns + number);
   std::array<double, geometry::kPoseSamples> all{};
   double sum = 0.0;
   for (double& one : all) {
@@ -30,8 +40,6 @@ std::array<double, geometry::kPoseSamples> factors() {
   return all;
 }
 
-}  // namespace
-
 double normal(core::SplitMix& random) {
   double sum = -6.0;
   for (int i = 0; i < 12; ++i) sum += static_cast<double>(random.next() >> 11U) * 0x1p-53;
@@ -39,19 +47,22 @@ double normal(core::SplitMix& random) {
 }
 
 std::vector<AnchorSamples> possible_errors(const CheckReport& report, const std::vector<GraphAnchor>& anchors,
-                                           const GraphReport& graph) {
+                                           const GraphReport& graph, const CameraPart& camera) {
   if (graph.draws.empty()) return {};
-  const double share = found_share();
-  const double found_m = share * graph.rms_m;
-  const double rest_m = std::sqrt(std::max(0.0, report.expected_m * report.expected_m - found_m * found_m));
+  const double share = found_share(report), of_camera = camera_share();
+  const double known_m = std::hypot(share * graph.rms_m, of_camera * camera.rms_m);
+  const double rest_m = std::sqrt(std::max(0.0, report.expected_m * report.expected_m - known_m * known_m));
   const double of_draws = rest_m / std::max(1e-9, graph.draws_rms_m);
-  const auto of_found = factors();
 
+  const auto of_found = factors_of(0);
   std::vector<AnchorSamples> all;
   for (std::size_t a = 0; a < anchors.size(); ++a) {
     AnchorSamples one{anchors[a].stamp, anchors[a].way, {}};
-    for (std::size_t s = 0; s < of_found.size(); ++s)
-      one.world[s] = share * of_found[s] * graph.found[a] + of_draws * graph.draws[a][s];
+    for (std::size_t s = 0; s < of_found.size(); ++s) {
+      one.world[s] = share * of_found[s] * graph.found[a] +
+                     of_draws * less_turned(graph.draws[a][s], anchors[a].world_from_camera.translation);
+      if (!camera.draws.empty()) one.world[s] += of_camera * camera.draws[a][s];
+    }
     all.push_back(one);
   }
   return all;

@@ -8,11 +8,13 @@
 #include <cmath>
 #include <utility>
 
+#include "camera_part.hpp"
 #include "graph.hpp"
 #include "pair.hpp"
 #include "pair_choice.hpp"
 #include "plumbline/core/numbers.hpp"
 #include "samples.hpp"
+#include "untied_path.hpp"
 #include "verdict.hpp"
 
 namespace plumbline::check {
@@ -231,9 +233,24 @@ class Check {
     const GraphReport graph = set_graph(anchors, report);
     set_local(report);
     set_steps(report);
+
+    report.untied_m = untied_length(input_.ways, ties());
+    const CameraPart camera = camera_part(input_, anchors);
+    report.camera_m = camera.rms_m;
     judge(report);
-    report.samples = possible_errors(report, anchors, graph);
+    report.samples = possible_errors(report, anchors, graph, camera);
     return report;
+  }
+
+  /// Frames that see a surface again where the path says so.
+  [[nodiscard]] std::vector<Tie> ties() const {
+    std::vector<Tie> all;
+    for (const AlignedPair& pair : pairs_[kRevisit]) {
+      const KeptFrame& a = frames_[anchors_[pair.first]].frame;
+      const KeptFrame& b = frames_[anchors_[pair.second]].frame;
+      if (!pair.contradicts) all.push_back({a.way, a.stamp, b.way, b.stamp});
+    }
+    return all;
   }
 
   void set_split(CheckReport& report) const {

@@ -16,8 +16,13 @@ constexpr double kLocal = 0.35;
 constexpr double kThirds = 1.3;
 constexpr double kSeconds = 0.5;
 constexpr double kP95 = 1.8;
-/// Share of the path's length by which it may drift where nothing is seen twice.
+/// Where the camera's part is known it takes the place of what the estimate tells; pairs see some of it, too.
+constexpr double kCamera = 1.4;
+constexpr double kBesideCamera = 0.7;
+/// Share of the length that nothing ties by which it may drift.
 constexpr double kDrift = 0.0005;
+constexpr double kMostlyTied = 0.5;   ///< more than this share is untied: that is told
+constexpr double kShortPath_m = 5.0;  ///< and more than this
 
 /// Limits beyond which a path is not trusted; shares are of the distance.
 struct Limit {
@@ -27,6 +32,7 @@ struct Limit {
 };
 constexpr Limit kMostThirds{0.011, 0.0065};
 constexpr Limit kMostSeconds{0.015, 0.010};
+constexpr Limit kMostThreeSeconds{0.033, 0.0125};
 constexpr Limit kMostLocal{0.020, 0.010};
 /// The limit of the expected error is a share of the path's length, within bounds.
 constexpr double kMostOfPath = 0.0045;
@@ -51,12 +57,24 @@ double typical_m(const CheckReport& report, Gap gap, Median median = &GapReport:
   return report.align[gap].pairs >= kEnoughPairs ? report.align[gap].*median : 0.0;
 }
 
-/// Depth against colour and the shifts over three seconds add nothing to these.
-double expected_m(const CheckReport& r, Median median = &GapReport::median_m) {
-  return std::sqrt(
-      squared(r.told_m) + squared(kGraph * r.graph_m) + squared(kRevisits * typical_m(r, kRevisit, median)) +
-      squared(kLocal * std::max(r.local.off_m, worst_tear(r))) + squared(kThirds * r.align[kThird].*median) +
-      squared(kSeconds * typical_m(r, kSecond, median)));
+/// Error that pairs show. Depth against colour and the shifts over three seconds add nothing to these.
+double seen_m(const CheckReport& r, Median median = &GapReport::median_m) {
+  return std::sqrt(squared(kGraph * r.graph_m) + squared(kRevisits * typical_m(r, kRevisit, median)) +
+                   squared(kLocal * std::max(r.local.off_m, worst_tear(r))) +
+                   squared(kThirds * r.align[kThird].*median) +
+                   squared(kSeconds * typical_m(r, kSecond, median)));
+}
+
+double expected_m(const CheckReport& r) {
+  if (r.camera_m > 0.0) return std::hypot(kBesideCamera * seen_m(r), kCamera * r.camera_m, r.drift_m);
+  return std::hypot(seen_m(r), r.told_m, r.drift_m);
+}
+
+/// "drift: nothing was seen twice on 43 of 61 m"; empty: nearly all of the path is tied.
+std::string drift_unchecked(const CheckReport& report) {
+  if (report.align[kRevisit].pairs == 0) return "drift: nothing was seen twice";
+  if (report.untied_m < std::max(kShortPath_m, kMostlyTied * report.path_m)) return {};
+  return fmt::format("drift: nothing was seen twice on {:.0f} of {:.0f} m", report.untied_m, report.path_m);
 }
 
 /// "frames a second apart are 2.1 cm off each other", if that is beyond the limit.
@@ -74,11 +92,14 @@ double least_local(const CheckReport& report) {
   return std::max(0.003, 5.0 * report.align[kSecond].median_m);
 }
 
-double found_share() { return kGraph; }
+double found_share(const CheckReport& report) {
+  return (report.camera_m > 0.0 ? kBesideCamera : 1.0) * kGraph;
+}
+double camera_share() { return kCamera; }
 
 void judge(CheckReport& report) {
-  if (report.checked() && report.align[kRevisit].pairs == 0) report.drift_m = kDrift * report.path_m;
-  report.expected_m = std::hypot(expected_m(report), report.drift_m);
+  if (report.checked()) report.drift_m = kDrift * report.untied_m;
+  report.expected_m = expected_m(report);
   report.p95_m = kP95 * report.expected_m;
   if (report.size_m > 0.0) report.lengths = std::sqrt(2.0) * report.expected_m / report.size_m;
 
@@ -90,7 +111,9 @@ void judge(CheckReport& report) {
           "no two frames show the same surface, such as where all depth is beyond the range");
     return;
   }
-  if (report.align[kRevisit].pairs == 0) report.unchecked.emplace_back("drift: nothing was seen twice");
+
+  if (std::string drift = drift_unchecked(report); !drift.empty())
+    report.unchecked.push_back(std::move(drift));
 
   std::vector<std::string>& reasons = report.reasons;
 
@@ -116,11 +139,12 @@ void judge(CheckReport& report) {
   // All pairs of one gap.
   doubt_gap(report, kThird, kMostThirds, "a third of a second", reasons);
   doubt_gap(report, kSecond, kMostSeconds, "a second", reasons);
+  doubt_gap(report, kThreeSeconds, kMostThreeSeconds, "three seconds", reasons);
   if (report.split_chi > kMostChi && report.align[kSecond].pairs >= kEnoughPairs) {
     reasons.push_back(fmt::format("depth and colour ask for paths that are {:.1f} cm apart in a second",
                                   100.0 * report.split_m));
   }
-  if (expected_m(report, &GapReport::unexplained_m) >
+  if (std::hypot(report.told_m, seen_m(report, &GapReport::unexplained_m)) >
       std::clamp(kMostOfPath * report.path_m, kLeastLimit_m, kMostLimit_m))
     reasons.push_back(fmt::format("the error to expect is {:.1f} cm", 100.0 * report.expected_m));
 }

@@ -9,7 +9,9 @@ namespace plumbline::check {
 double least_local(const CheckReport& report);
 
 /// Share of graph_m that counts in expected_m.
-double found_share();
+double found_share(const CheckReport& report);
+/// The same of camera_m.
+double camera_share();
 
 /// Fills in drift_m, expected_m, p95_m, reasons and unchecked from the other numbers.
 void judge(CheckReport& report);

@@ -36,12 +36,21 @@ struct Way {
   geometry::Trajectory path;
 };
 
+/// Effect of an uncertain camera on the pose at a stamp: motions (t, w) of the camera in its own axes, metres
+/// and radians, times independent numbers of variance 1, which are the same at all stamps.
+struct CameraShift {
+  std::size_t way = 0;
+  double stamp = 0.0;  ///< seconds
+  std::vector<geometry::Vector6d> motions;
+};
+
 struct CheckInput {
   std::vector<Way> ways;
   std::vector<KeptFrame> frames;                                     ///< by way, in order of their stamps
   std::function<core::Result<SmallFrame>(std::size_t number)> read;  ///< thread-safe
-  double max_dt_s = 0.005;  ///< a frame has a pose if the path has one so near to its stamp
-  double told_m = 0.0;      ///< standard deviation of positions that the estimate tells of itself; 0: unknown
+  double max_dt_s = 0.005;          ///< a frame has a pose if the path has one so near to its stamp
+  std::vector<CameraShift> camera;  ///< by way, in order of their stamps; empty: not known
+  double told_m = 0.0;  ///< standard deviation of positions that the estimate tells of itself; 0: unknown
 };
 
 /// Pairs of one kind.
@@ -82,12 +91,14 @@ struct CheckReport {
   std::vector<BadPlace> tears;  ///< steps that no camera makes, or that the pictures contradict
   std::vector<BadPlace> along;  ///< of each anchor: the shift that pairs around it and all together ask for
   std::vector<AnchorSamples>
-      samples;           ///< by way, in order of their stamps: their RMS is expected_m; path_samples.hpp
-  double drift_m = 0.0;  ///< what a path may have drifted by that sees nothing twice; else 0
+      samples;            ///< by way, in order of their stamps: their RMS is expected_m; path_samples.hpp
+  double untied_m = 0.0;  ///< length of path that lies between no two places seen twice
+  double drift_m = 0.0;   ///< what that part may have drifted by
   std::array<double, 2> noise{};     ///< of depth: a + b z^2, metres
   double distance_m = 0.0;           ///< median depth
   double path_m = 0.0;               ///< length of all paths
   double size_m = 0.0;               ///< of what was recorded: the box around the anchors and twice the depth
+  double camera_m = 0.0;             ///< RMS of what CheckInput::camera means for the path
   double told_m = 0.0;               ///< CheckInput::told_m
   double expected_m = 0.0;           ///< expected RMS error of positions after SE(3)
   double p95_m = 0.0;                ///< 95 % of such results have a smaller error

@@ -20,6 +20,8 @@
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/maps/output_check.hpp"
 #include "plumbline/maps/pose_samples.hpp"
+#include "plumbline/maps/stored_run.hpp"
+#include "plumbline/pipeline/camera_shifts.hpp"
 #include "plumbline/pipeline/input.hpp"
 #include "terminal/print.hpp"
 
@@ -62,6 +64,16 @@ double told_by(const fs::path& result) {
     ++count;
   }
   return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0.0;
+}
+
+/// Shifts by the camera's covariance, of a result that kept its map; empty: not known.
+std::vector<check::CameraShift> camera_of(const fs::path& result, const core::Executor& executor) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(result / "map.db", ignored)) return {};
+  const auto run = maps::StoredRun::open_main(result / "map.db");
+  if (!run) return {};
+  const maps::StoredMap& stored = run->stored();
+  return pipeline::camera_shifts(stored.map, stored.frames, stored.header.robots, executor);
 }
 
 core::Result<std::unique_ptr<dataset::FrameSource>> open_for_check(const CheckRequest& request,
@@ -137,6 +149,7 @@ core::Result<check::CheckReport> check_recording(const CheckRequest& request, Se
   input.ways.push_back({camera.color, camera.readout_s.value_or(0.0), std::move(*path)});
   input.max_dt_s = request.max_dt_s;
   input.told_m = told_by(request.path);
+  input.camera = camera_of(request.path, session.executor());
 
   // Frames that have a pose
   const check::FrameStore store = keep_frames(**source, request, session, input);

@@ -13,6 +13,7 @@
 #include "plumbline/check/self_check.hpp"
 #include "plumbline/core/json.hpp"
 #include "plumbline/maps/pose_samples.hpp"
+#include "plumbline/pipeline/camera_shifts.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "results/resumed_run.hpp"
 #include "stages/stages.hpp"
@@ -105,6 +106,8 @@ class CheckStage : public Stage {
     const std::vector<RobotInfo>& robots = map->robots.empty() ? recordings().robots() : map->robots;
     check::CheckInput input;
     input.told_m = told_m(map->accuracy);
+    if (map->map != nullptr)
+      input.camera = camera_shifts(*map->map, map->frame_poses, robots, *context_->executor);
 
     std::vector<CameraChanges> cameras(robots.begin(), robots.end());
     std::vector<const check::RecalibratedFrame*> change(store_->size(), nullptr);

@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 #include <random>
 
+#include "../../../src/check/untied_path.hpp"
 #include "plumbline/check/path_samples.hpp"
 
 namespace plumbline::check {
@@ -53,8 +54,10 @@ SmallFrame film(double stamp) {
 
 /// The report on a path whose positions are off by offset(stamp).
 template <typename Offset>
-std::pair<CheckReport, geometry::Trajectory> checked(const Offset& offset, int threads) {
+std::pair<CheckReport, geometry::Trajectory> checked(const Offset& offset, int threads,
+                                                     std::vector<CameraShift> camera = {}) {
   CheckInput input;
+  input.camera = std::move(camera);
   input.ways.push_back({kCamera, 0.0, {}});
   for (std::size_t i = 0; i < 60; ++i) {
     const double stamp = kStep_s * static_cast<double>(i);
@@ -137,6 +140,60 @@ TEST(CheckSamples, WhereNothingIsSeenTwiceTheErrorGrowsWithThePath) {
   EXPECT_LT(report.drift_m, 0.01 * report.path_m);
   EXPECT_GE(report.expected_m, report.drift_m);
   EXPECT_NE(sentence(report).find("nothing was seen twice"), std::string::npos);
+}
+
+TEST(CheckSamples, CameraMovesPlacesTogetherAndIsPartOfTheErrorToExpect) {
+  const auto right = [](double) { return Eigen::Vector3d::Zero(); };
+  const auto [before, path] = checked(right, 1);
+  EXPECT_EQ(before.camera_m, 0.0);
+
+  // One number that makes the path larger, told at every third pose, and one that moves it as a whole.
+  std::vector<CameraShift> camera;
+  for (std::size_t i = 0; i < path.size(); i += 3) {
+    const Rigid3& pose = path[i].world_from_camera;
+    geometry::Vector6d larger = geometry::Vector6d::Zero(), whole = geometry::Vector6d::Zero();
+    larger.head<3>() = pose.rotation.transpose() * (0.05 * pose.translation);
+    whole.head<3>() = pose.rotation.transpose() * Eigen::Vector3d(0.3, 0.2, 0.1);
+    camera.push_back({0, path[i].stamp, {larger, whole}});
+  }
+  const auto [after, same] = checked(right, 1, camera);
+
+  double sum = 0.0;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const auto& pose : path)
+    middle += pose.world_from_camera.translation / static_cast<double>(path.size());
+  for (const auto& pose : path) sum += (pose.world_from_camera.translation - middle).squaredNorm();
+  EXPECT_NEAR(after.camera_m, 0.05 * std::sqrt(sum / static_cast<double>(path.size())), 0.1 * after.camera_m);
+  EXPECT_GT(after.expected_m, after.camera_m);
+
+  // Distances across the path grow and shrink together.
+  const auto across = [&](const CheckReport& report, std::size_t s, std::size_t i) {
+    const Rigid3 &a = path[i].world_from_camera, &b = path[i + 36].world_from_camera;
+    return (a * samples_of(report, 0, path[i])[s].head<3>() -
+            b * samples_of(report, 0, path[i + 36])[s].head<3>())
+                   .norm() /
+               (a.translation - b.translation).norm() -
+           1.0;
+  };
+  double together = 0.0, alone = 0.0;
+  for (std::size_t s = 0; s < geometry::kPoseSamples; ++s) {
+    together += across(after, s, 0) * across(after, s, 18);
+    alone += across(after, s, 0) * across(after, s, 0);
+  }
+  EXPECT_GT(together, 0.5 * alone);
+}
+
+TEST(CheckSamples, WhatLiesBetweenNoTwoTiedPlacesIsUntied) {
+  std::vector<Way> ways(2);
+  for (std::size_t i = 0; i <= 20; ++i) {
+    for (Way& way : ways)
+      way.path.push_back(
+          {static_cast<double>(i), {Eigen::Matrix3d::Identity(), {0.5 * static_cast<double>(i), 0, 0}}});
+  }
+  EXPECT_NEAR(untied_length(ways, {}), 20.0, 1e-9);
+  EXPECT_NEAR(untied_length(ways, {{0, 12.0, 0, 4.0}, {0, 6.0, 0, 14.0}}), 15.0, 1e-9);
+  EXPECT_NEAR(untied_length(ways, {{0, 2.0, 1, 3.0}}), 20.0, 1e-9) << "one meeting ties nothing";
+  EXPECT_NEAR(untied_length(ways, {{0, 2.0, 1, 3.0}, {1, 13.0, 0, 18.0}}), 7.0, 1e-9);
 }
 
 }  // namespace

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/mapping/adjustment/camera_shifts.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "plumbline/mapping/adjustment/map_recalibration.hpp"
+
+namespace plumbline::mapping {
+namespace {
+
+using geometry::Vector6d;
+using optimize::CameraCovariance;
+using optimize::kCameraUnknowns;
+
+/// Keyframes alone: enough for the motion of the camera.
+std::vector<maps::FramePose> only_keyframes(const std::vector<maps::FramePose>& frames,
+                                            const maps::Map& map) {
+  std::vector<maps::FramePose> some;
+  for (const maps::FramePose& frame : frames) {
+    if (!maps::became_keyframe(frame, map)) continue;
+    some.push_back(frame);
+    some.back().camera_from_previous.reset();
+    some.back().seen.reset();
+  }
+  return some;
+}
+
+/// Motions of the keyframes, each in its camera's axes, if the camera is another one.
+std::vector<Vector6d> motions_for(const maps::Map& map, std::vector<maps::FramePose> frames,
+                                  const sensor::Recalibration& change) {
+  maps::Map other = map;
+  recalibrate_map(change, other, frames);
+  std::vector<Vector6d> motions;
+  for (const core::KeyframeId id : map.keyframe_ids()) {
+    const geometry::Rigid3 step = map.camera_from_world(id) * other.camera_from_world(id).inverse();
+    Vector6d motion;
+    motion << step.translation, geometry::log_so3(step.rotation);
+    motions.push_back(motion);
+  }
+  return motions;
+}
+
+/// A square root: covariance = root * root'. Numbers that are known for certain are zero in it.
+CameraCovariance root_of(const CameraCovariance& covariance, const optimize::CameraChange& sigma) {
+  const optimize::CameraChange scale = sigma.cwiseMax(1e-12).cwiseInverse();
+  const CameraCovariance correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<CameraCovariance> solver(correlation);
+  return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+}
+
+}  // namespace
+
+std::vector<KeyframeShift> camera_shifts(const maps::Map& map, const std::vector<maps::FramePose>& frames,
+                                         const sensor::Pinhole& image, const sensor::Camera& camera,
+                                         const CameraCovariance& covariance, const core::Executor& executor) {
+  if (!covariance.allFinite() || map.keyframe_count() < 2) return {};
+  const std::vector<maps::FramePose> keyframes = only_keyframes(frames, map);
+  const optimize::CameraChange sigma = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+
+  // One standard deviation of each number.
+  std::vector<std::vector<Vector6d>> by_number(kCameraUnknowns);
+  executor.parallel_for(kCameraUnknowns, [&](std::size_t u) {
+    optimize::CameraChange change = optimize::change_between(camera, camera);
+    change[static_cast<Eigen::Index>(u)] += sigma[static_cast<Eigen::Index>(u)];
+    const sensor::Recalibration to(image, camera, optimize::changed_camera(camera, change));
+    by_number[u] = motions_for(map, keyframes, to);
+  });
+
+  // Their combinations that are independent.
+  const CameraCovariance root = root_of(covariance, sigma);
+  std::vector<KeyframeShift> shifts;
+  for (const core::KeyframeId id : map.keyframe_ids()) {
+    KeyframeShift shift{id, map.keyframe(id).stamp, {}};
+    for (Eigen::Index m = 0; m < root.cols(); ++m) {
+      Vector6d motion = Vector6d::Zero();
+      for (std::size_t u = 0; u < kCameraUnknowns; ++u)
+        motion += root(static_cast<Eigen::Index>(u), m) * by_number[u][shifts.size()];
+      shift.motions.push_back(motion);
+    }
+    shifts.push_back(std::move(shift));
+  }
+  return shifts;
+}
+
+}  // namespace plumbline::mapping
