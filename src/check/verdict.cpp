@@ -16,6 +16,8 @@ constexpr double kLocal = 0.35;
 constexpr double kThirds = 1.3;
 constexpr double kSeconds = 0.5;
 constexpr double kP95 = 1.8;
+/// Standard deviations are told relative to the first keyframe: fitted to each other paths differ by less.
+constexpr double kTold = 0.5;
 /// Where the camera's part is known it takes the place of what the estimate tells; pairs see some of it, too.
 constexpr double kCamera = 1.4;
 constexpr double kBesideCamera = 0.7;
@@ -67,7 +69,7 @@ double seen_m(const CheckReport& r, Median median = &GapReport::median_m) {
 
 double expected_m(const CheckReport& r) {
   if (r.camera_m > 0.0) return std::hypot(kBesideCamera * seen_m(r), kCamera * r.camera_m, r.drift_m);
-  return std::hypot(seen_m(r), r.told_m, r.drift_m);
+  return std::hypot(seen_m(r), kTold * r.told_m, r.drift_m);
 }
 
 /// "drift: nothing was seen twice on 43 of 61 m"; empty: nearly all of the path is tied.
@@ -144,6 +146,7 @@ void judge(CheckReport& report) {
     reasons.push_back(fmt::format("depth and colour ask for paths that are {:.1f} cm apart in a second",
                                   100.0 * report.split_m));
   }
+
   if (std::hypot(report.told_m, seen_m(report, &GapReport::unexplained_m)) >
       std::clamp(kMostOfPath * report.path_m, kLeastLimit_m, kMostLimit_m))
     reasons.push_back(fmt::format("the error to expect is {:.1f} cm", 100.0 * report.expected_m));

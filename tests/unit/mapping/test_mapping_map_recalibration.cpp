@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "landmark_world.hpp"
+#include "plumbline/mapping/adjustment/camera_shifts.hpp"
 #include "plumbline/mapping/adjustment/map_recalibration.hpp"
 
 namespace plumbline::mapping {
@@ -118,6 +119,46 @@ TEST(MapRecalibration, AMapOfTheWrongCameraBecomesThatOfTheRightOne) {
   EXPECT_LT(wall.landmarks_off(), 0.002);
   EXPECT_LT(wall.features_off(poses), 0.05);
   EXPECT_LT(largest_difference(wall.poses(), poses), 0.002);
+}
+
+// Numbers that are wrong together move keyframes as the camera does that has both, and nothing else moves
+// them.
+TEST(MapRecalibration, ShiftsByTheCovarianceAreThoseOfTheOtherCamera) {
+  FilmedWall wall;
+  const std::vector<Rigid3> poses = wall.poses();
+  constexpr double kLonger = 0.01, kRight_px = 3.0;
+  optimize::CameraCovariance covariance = optimize::CameraCovariance::Zero();
+  const auto shifts_now = [&] {
+    return camera_shifts(wall.world.map, wall.frames, wall.world.camera, wall.given(), covariance,
+                         core::Executor(2));
+  };
+  for (const KeyframeShift& shift : shifts_now()) {
+    for (const geometry::Vector6d& motion : shift.motions) EXPECT_LT(motion.norm(), 1e-9);
+  }
+
+  covariance(optimize::kFocal, optimize::kFocal) = kLonger * kLonger;
+  covariance(optimize::kCentreX, optimize::kCentreX) = kRight_px * kRight_px;
+  covariance(optimize::kFocal, optimize::kCentreX) = covariance(optimize::kCentreX, optimize::kFocal) =
+      0.999 * kLonger * kRight_px;
+  const std::vector<KeyframeShift> shifts = shifts_now();
+
+  sensor::Camera other = wall.given();
+  other.color.fx *= 1.0 + kLonger;
+  other.color.fy *= 1.0 + kLonger;
+  other.color.cx += kRight_px;
+  wall.change(wall.given(), other);
+
+  ASSERT_EQ(shifts.size(), poses.size());
+  double largest = 0.0;
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    EXPECT_EQ(shifts[k].keyframe, wall.keyframes[k]);
+    const Rigid3 step = poses[k] * wall.poses()[k].inverse();
+    double squares = 0.0;
+    for (const geometry::Vector6d& motion : shifts[k].motions) squares += motion.head<3>().squaredNorm();
+    EXPECT_NEAR(std::sqrt(squares), step.translation.norm(), 0.1 * step.translation.norm() + 1e-4) << k;
+    largest = std::max(largest, step.translation.norm());
+  }
+  EXPECT_GT(largest, 0.002);
 }
 
 /// Ten frames between the first two keyframes of a wall, whose corrected poses drift away from their
