@@ -16,10 +16,11 @@ namespace fs = std::filesystem;
 
 /// Names in a result folder (docs/reference/files.md); of a folder everything in it belongs to the result.
 const std::set<std::string> kPartsOfAResult{
-    "map.ply",     "map.pcd",     "trajectory.txt", "keyframes.txt",   "keyframes.csv", "lines.ply",
-    "frames.csv",  "timing.csv",  "summary.json",   "map.db",          "map.db-wal",    "map.db-shm",
-    "camera.yaml", "config.yaml", "hub.log",        "snapshots",       "robots",        "meetings",
-    "components",  "levels",      "keyframes",      "pose_samples.npy"};
+    "map.ply",     "map.pcd",     "trajectory.txt", "keyframes.txt",    "keyframes.csv", "lines.ply",
+    "frames.csv",  "timing.csv",  "summary.json",   "map.db",           "map.db-wal",    "map.db-shm",
+    "camera.yaml", "config.yaml", "hub.log",        "snapshots",        "robots",        "meetings",
+    "components",  "levels",      "keyframes",      "pose_samples.npy", "adjust.json",   "georeference.json",
+    "tags.csv",    "edits.yaml"};
 
 }  // namespace
 

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -178,6 +179,44 @@ core::Result<std::size_t> StoredMaps::find_part(const std::string& name) const {
     }
   }
   return core::usage_error(fmt::format("--anchor: there is no robot '{}'; there are {}", name, names));
+}
+
+core::Result<void> StoredMaps::replace(std::size_t index, Map map, std::vector<FramePose> frames,
+                                       double scale) {
+  StoredPart& part = parts_[index];
+  part.run.replace(std::move(map), std::move(frames));
+  replaced_ = true;
+
+  // Clouds are read as those of a further version of their camera.
+  const auto rescale = [&](RobotInfo& robot) {
+    robot.camera.depth_scale /= scale;
+    if (robot.estimate) robot.estimate->found.depth_scale /= scale;
+  };
+  std::vector<RobotInfo> stored = part.run.stored().header.robots;
+  for (std::size_t r = 0; r < stored.size(); ++r) {
+    const std::vector<CameraVersion>& versions = stored[r].versions;
+    CameraVersion last{versions.empty() ? stored[r].camera : versions.back().camera,
+                       std::numeric_limits<std::int32_t>::max(), std::numeric_limits<std::int32_t>::max()};
+    last.camera.depth_scale /= scale;
+    stored[r].versions.push_back(last);
+    rescale(part.robots[r]);
+    rescale(robots_[static_cast<std::size_t>(part.robots[r].number)]);
+  }
+  auto views = part.run.views();
+  if (!views) return tl::unexpected(views.error());
+  part.views = std::move(*views);
+  part.views.cameras = CameraHistory(stored);
+
+  const auto state = part.run.fusion_state();
+  if (!state) return tl::unexpected(state.error());
+  geometry::Vector6d longer = geometry::Vector6d::Ones();
+  longer.head<3>().setConstant(scale);
+  for (const auto& [key, covariance] : state->covariances) {
+    const auto number = part.views.numbers.find(key.first);
+    const std::int32_t robot = number == part.views.numbers.end() ? key.first : number->second;
+    part.state.covariances[{robot, key.second}] = longer.asDiagonal() * covariance * longer.asDiagonal();
+  }
+  return {};
 }
 
 }  // namespace plumbline::maps

@@ -101,6 +101,11 @@ void StoredRun::renumber(const RobotNumbers& numbers) {
   }
 }
 
+void StoredRun::replace(Map map, std::vector<FramePose> frames) {
+  map_.map = std::move(map);
+  map_.frames = std::move(frames);
+}
+
 MapPoses StoredRun::poses() const {
   MapPoses poses = poses_of(map_.map, map_.frames);
   move(poses, map_.result.output_from_map);

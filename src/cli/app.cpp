@@ -25,6 +25,7 @@
 #include "terminal/version_text.hpp"
 
 namespace plumbline::cli {
+void add_adjust(CLI::App& app, Session& session);
 namespace {
 
 const char* const kFooter =
@@ -255,10 +256,10 @@ int run(int argc, char** argv) {
 
   // The order of the commands in --help
   Session session;
-  for (const auto add :
-       {add_map,      add_localize, add_fuse,   add_hub,    add_robot,     add_keys, add_calibrate,
-        add_convert,  add_info,     add_render, add_export, add_report,    add_view, add_compare,
-        add_evaluate, add_check,    add_synth,  add_filter, add_pipelines, add_play, add_completion}) {
+  for (const auto add : {add_map,       add_localize,  add_fuse,   add_hub,       add_robot,  add_keys,
+                         add_calibrate, add_convert,   add_info,   add_render,    add_export, add_report,
+                         add_view,      add_compare,   add_adjust, add_evaluate,  add_check,  add_synth,
+                         add_filter,    add_pipelines, add_play,   add_completion}) {
     add(app, session);
   }
 

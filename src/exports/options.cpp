@@ -20,7 +20,7 @@ void ExportOptions::declare(core::OptionTable& table) {
   table.integer("epsg", epsg, {0, 999999}, "", "A projected coordinate system in metres, with --origin");
   table.numbers("origin", origin, 0, {-kWorld_m, kWorld_m}, "",
                 "East,north,height of the map's origin in --epsg, metres; a fourth number turns the map "
-                "clockwise, degrees");
+                "clockwise, degrees, and a fifth is the scale of the grid");
 
   table.number("resolution", resolution_m, {0.0, 10.0}, "m",
                "Cell size of a grid (0: 5 cm), or approximate edge length of a mesh (0: 2 cm)");

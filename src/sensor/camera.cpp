@@ -224,6 +224,8 @@ void read_sigma(const ConfigNode& root, CameraSigma& sigma, ConfigProblems& prob
     const bool seconds = value == &sigma.readout_s || value == &sigma.depth_delay_s;
     table.number(key, *value, {0.0, 1e3}, seconds ? "s" : "", "Standard deviation; 0: not known");
   }
+  double of_scale = 0.0;  // adjust tells it to readers; nothing here estimates the scale
+  table.number("depth_scale", of_scale, {0.0, 1e6}, "", "Standard deviation; 0: not known");
   table.set_all(*node, "sigma", problems);
 }
 

@@ -48,7 +48,7 @@ double ImageModel::true_depth(const Eigen::Vector2d& rectified, double measured)
 Recalibration::Recalibration(const Pinhole& image, const Camera& before, const Camera& after)
     : before_(image, before), after_(image, after) {
   moves_pixels_ = before.lens() != after.lens() || !same(before.color, after.color);
-  moves_depth_ = before.depth_slope != after.depth_slope ||
+  moves_depth_ = before.depth_slope != after.depth_slope || before.depth_scale != after.depth_scale ||
                  (moves_pixels_ && !(before.color_from_depth && before.depth));
   if (!moves_pixels_) return;
 
@@ -83,7 +83,8 @@ Eigen::Vector2d Recalibration::pixel(const Eigen::Vector2d& rectified) const {
 
 double Recalibration::depth(const Eigen::Vector2d& before, const Eigen::Vector2d& now, double z) const {
   if (!moves_depth_) return z;
-  return after_.true_depth(now, before_.measured_depth(before, z));
+  const double longer = before_.camera().depth_scale / after_.camera().depth_scale;
+  return after_.true_depth(now, longer * before_.measured_depth(before, z));
 }
 
 /// The pixel moves with the lens, the depth with the slope.
@@ -104,7 +105,9 @@ Eigen::Vector3d Recalibration::normal(const Eigen::Vector3d& p, const Eigen::Vec
   if (!moves_depth_ || std::abs(d) < 1e-3) return normal;
   const std::array<double, 2>& then = before_.camera().depth_slope;
   const std::array<double, 2>& now = after_.camera().depth_slope;
-  const Eigen::Vector3d tilted = normal / d + Eigen::Vector3d(now[0] - then[0], now[1] - then[1], 0.0);
+  const double longer = before_.camera().depth_scale / after_.camera().depth_scale;
+  const Eigen::Vector3d tilted =
+      normal / (longer * d) + Eigen::Vector3d(now[0] - then[0], now[1] - then[1], 0.0);
   return (d > 0.0 ? tilted : Eigen::Vector3d(-tilted)).normalized();
 }
 

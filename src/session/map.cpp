@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "guarded.hpp"
+#include "plumbline/adjust/adjust.hpp"
 #include "plumbline/core/shortage.hpp"
 #include "plumbline/pipeline/fuse_maps.hpp"
 #include "plumbline/pipeline/map_recording.hpp"
@@ -134,6 +135,25 @@ core::Result<pipeline::RunSummary> run_fuse(const std::vector<fs::path>& maps, c
     const OpenCvThreads one;
     const core::Executor executor(options.threads);
     const auto log = options.log != nullptr ? options.log : core::null_log();
+    return pipeline::fuse_stored_maps(request, executor, *log, options.stop, options.progress);
+  });
+}
+
+core::Result<pipeline::RunSummary> run_adjust(const fs::path& map, const fs::path& output,
+                                              const adjust::AdjustRequest& wanted,
+                                              const FuseOptions& options) {
+  return guarded([&]() -> core::Result<pipeline::RunSummary> {
+    pipeline::FuseRequest request;
+    if (auto filled = fill(request, options, output); !filled) return tl::unexpected(filled.error());
+    const auto settings = adjust::fusion_settings(map);
+    if (!settings) return tl::unexpected(settings.error());
+    request.overrides.insert(request.overrides.begin(), settings->begin(), settings->end());
+    request.maps = {map};
+
+    const OpenCvThreads one;
+    const core::Executor executor(options.threads);
+    const auto log = options.log != nullptr ? options.log : core::null_log();
+    request.change = adjust::change_of(wanted, executor, *log);
     return pipeline::fuse_stored_maps(request, executor, *log, options.stop, options.progress);
   });
 }

@@ -21,7 +21,7 @@ LAYERS = [
     ["tracking", "places", "evaluate", "synth", "viewer", "check"],
     ["mapping", "inertial"],
     ["viz", "exports", "localize"],
-    ["changes"],
+    ["adjust", "changes"],
     ["pipeline", "report"],
     ["session"],
     ["net"],

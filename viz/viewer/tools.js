@@ -138,7 +138,12 @@ class Measuring {
       `${tilt > 45 ? `${(90 - tilt).toFixed(1)}° from level` : `${tilt.toFixed(1)}° from upright`}`;
   }
 
-  text() { return this.list.map((m) => m.text).join('\n'); }
+  text() { return this.list.map((m) => m.text + this.flagOf(m)).join('\n'); }
+  /** A distance as `plumbline adjust` takes it, to be corrected to what a tape says. */
+  flagOf({ tool, points, value }) {
+    const at = ({ p }) => `"${this.view.ofMap(p).map((v) => v.toFixed(4)).join(',')}"`;
+    return tool === 'distance' && points.length === 2 ? `\n  --length ${at(points[0])} ${at(points[1])} ${value.toFixed(4)}m` : '';
+  }
 }
 
 /** Length of a line through points. */

@@ -6,9 +6,11 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "plumbline/core/executor.hpp"
+#include "plumbline/maps/fusion_state.hpp"
 #include "plumbline/maps/stored_run.hpp"
 
 namespace plumbline::maps {
@@ -19,12 +21,19 @@ struct StoredPart {
   StoredRun run;
   std::vector<RobotInfo> robots;  ///< with the numbers of this run, without versions of cameras
   StoredViews views = {};         ///< clouds of the store
+  FusionState state = {};         ///< covariances, by this run's numbers of robots; only after replace()
 };
 
 /// A cloud in a store.
 struct StoredCloud {
   std::size_t part = 0;  ///< index of the store
   std::size_t view = 0;  ///< index into the store's views
+};
+
+/// One place in the results of two maps, metres.
+struct Pick {
+  std::size_t first_part = 0;  ///< whose place `first` is; `second` is the other one's
+  Eigen::Vector3d first = Eigen::Vector3d::Zero(), second = Eigen::Vector3d::Zero();
 };
 
 /// Order of the parts of several maps.
@@ -54,6 +63,14 @@ class StoredMaps {
   [[nodiscard]] core::Error damaged(core::KeyframeId id, FrameId frame, const core::Error& how) const;
   /// The part that has this name, or a robot of this name. Errors (kUsage): there is none.
   [[nodiscard]] core::Result<std::size_t> find_part(const std::string& name) const;
+  /// Another map in place of a part's, whose lengths are `scale` times as long: clouds, covariances and the
+  /// depth scales of cameras follow. Errors (kInput): damaged.
+  core::Result<void> replace(std::size_t part, Map map, std::vector<FramePose> frames, double scale);
+  /// A map was replaced: it keeps its poses and its frame, and nothing is joined.
+  [[nodiscard]] bool replaced() const { return replaced_; }
+  /// Places that two maps have in common.
+  void set_picks(std::vector<Pick> picks) { picks_ = std::move(picks); }
+  [[nodiscard]] const std::vector<Pick>& picks() const { return picks_; }
 
  private:
   StoredMaps() = default;
@@ -64,6 +81,8 @@ class StoredMaps {
   std::vector<StoredPart> parts_;
   std::vector<RobotInfo> robots_;
   std::vector<StoredCloud> clouds_;
+  std::vector<Pick> picks_;
+  bool replaced_ = false;
 };
 
 }  // namespace plumbline::maps

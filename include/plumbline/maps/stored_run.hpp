@@ -46,6 +46,8 @@ class StoredRun {
 
   /// Renumbers the robots of its map.
   void renumber(const RobotNumbers& numbers);
+  /// Other poses and landmarks for the same keyframes; the frames are those of the map it has.
+  void replace(Map map, std::vector<FramePose> frames);
 
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
   /// Its header has the store's numbers of robots, the map and the frames those that were given last.

@@ -3,7 +3,10 @@
 
 // `plumbline fuse` as a call: finished maps in, one result folder out.
 #include <filesystem>
+#include <functional>
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "plumbline/core/error.hpp"
@@ -12,6 +15,10 @@
 #include "plumbline/core/stop.hpp"
 #include "plumbline/pipeline/run.hpp"
 #include "plumbline/pipeline/summary.hpp"
+
+namespace plumbline::maps {
+class StoredMaps;
+}
 
 namespace plumbline::pipeline {
 
@@ -22,6 +29,12 @@ struct FuseRequest : RunRequest {
   /// change on disk. Empty: all maps are equal.
   std::filesystem::path into;
   std::string anchor;  ///< robot or map that defines the common frame; empty: by content
+  /// Places that the first and the second of two maps have in common: two or more, of which two lie 20 cm
+  /// apart as seen from above. They join what overlaps too little.
+  std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> picks;
+  /// Changes the maps that were read, before anything else; there is one, and its frame stays. Returns
+  /// further files of the result: names and texts. Empty: nothing is changed.
+  std::function<core::Result<std::map<std::string, std::string>>(maps::StoredMaps&)> change;
 };
 
 /// The result does not depend on the order of `maps`; a single one is refined and fused. Errors as

@@ -18,6 +18,10 @@
 #include "plumbline/pipeline/summary.hpp"
 #include "plumbline/session/options.hpp"
 
+namespace plumbline::adjust {
+struct AdjustRequest;
+}
+
 namespace plumbline::session {
 
 /// While at least one object lives, OpenCV starts no threads of its own; the last one restores their number.
@@ -38,6 +42,11 @@ core::Result<pipeline::RunSummary> run_map(const std::string& input, const std::
                                            const MapOptions& options);
 core::Result<pipeline::RunSummary> run_fuse(const std::vector<std::filesystem::path>& maps,
                                             const std::filesystem::path& output, const FuseOptions& options);
+/// `plumbline adjust`; what is fused again is as FuseOptions say.
+core::Result<pipeline::RunSummary> run_adjust(const std::filesystem::path& map,
+                                              const std::filesystem::path& output,
+                                              const adjust::AdjustRequest& request,
+                                              const FuseOptions& options);
 
 /// One run in a thread of its own.
 class Background {

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "app.hpp"
+#include "plumbline/adjust/control.hpp"
 #include "plumbline/pipeline/fuse_maps.hpp"
 #include "terminal/signals.hpp"
 
@@ -13,8 +14,23 @@ namespace {
 
 constexpr std::size_t kMaxMaps = 255;
 
+/// "x,y,z=x,y,z" each. Errors (kUsage).
+core::Result<void> read_picks(const std::vector<std::string>& words, pipeline::FuseRequest& request) {
+  for (const std::string& word : words) {
+    const std::size_t sign = word.find('=');
+    const auto first = adjust::place_of(word.substr(0, sign), "--pick");
+    const auto second =
+        adjust::place_of(sign == std::string::npos ? std::string() : word.substr(sign + 1), "--pick");
+    if (!first) return tl::unexpected(first.error());
+    if (!second) return tl::unexpected(second.error());
+    request.picks.emplace_back(*first, *second);
+  }
+  return {};
+}
+
 /// Fuses the maps and prints the summary.
-int fuse(Session& session, pipeline::FuseRequest request) {
+int fuse(Session& session, pipeline::FuseRequest request, const std::vector<std::string>& picks) {
+  if (auto read = read_picks(picks, request); !read) return session.fail(read.error());
   if (request.maps.size() > kMaxMaps) {
     return session.fail(
         core::usage_error(fmt::format("MAP: give at most {} maps at once, and fuse the results", kMaxMaps))
@@ -32,9 +48,10 @@ int fuse(Session& session, pipeline::FuseRequest request) {
 /// Options of fuse.
 void add_fuse(CLI::App& app, Session& session) {
   const auto request = std::make_shared<pipeline::FuseRequest>();
+  const auto picks = std::make_shared<std::vector<std::string>>();
   CLI::App* command =
       add_command(app, session, "fuse", "Merge finished maps of several robots into one frame",
-                  [&session, request] { return fuse(session, *request); });
+                  [&session, request, picks] { return fuse(session, *request, *picks); });
   command
       ->add_option("MAP", request->maps,
                    "Result folders of plumbline map or fuse; their order does not matter")
@@ -45,6 +62,14 @@ void add_fuse(CLI::App& app, Session& session) {
       ->add_option("--anchor", request->anchor,
                    "Robot whose map defines the frame of the result (default: the one with the largest map)")
       ->type_name("NAME");
+  command
+      ->add_option(
+          "--pick", *picks,
+          "A place in the first of two maps and the same one in the second, for maps that share a door "
+          "only; two or more")
+      ->expected(1)
+      ->take_all()
+      ->type_name("X,Y,Z=X,Y,Z");
   add_pipeline_options(*command, session, *request);
 }
 

@@ -116,8 +116,25 @@ core::Result<void> place_map(double latitude, double longitude, double heading, 
   return {};
 }
 
+core::Result<void> place_at_origin(Georeference& reference) {
+  const Eigen::Vector3d origin = reference.origin;
+  const Context context = quiet_context();
+  const Pj from_degrees = from_degrees_into(context.get(), reference.epsg);
+  const PJ_COORD at =
+      from_degrees ? proj_trans(from_degrees.get(), PJ_INV, proj_coord(origin.x(), origin.y(), 0.0, 0.0))
+                   : proj_coord(HUGE_VAL, HUGE_VAL, 0.0, 0.0);
+  if (!std::isfinite(at.xy.x + at.xy.y)) {
+    return core::usage_error(fmt::format("EPSG:{} does not cover east {:.0f}, north {:.0f}", reference.epsg,
+                                         origin.x(), origin.y()));
+  }
+  auto placed = place_map(at.xy.y, at.xy.x, 0.0, reference);
+  reference.origin = origin;
+  return placed;
+}
+
 }  // namespace
 }  // namespace plumbline::exports
 
 namespace px = plumbline::exports;
-PLUMBLINE_PART(px::ProjFunctions, &px::describe_system, &px::place_map, &px::covers_origin)
+PLUMBLINE_PART(px::ProjFunctions, &px::describe_system, &px::place_map, &px::place_at_origin,
+               &px::covers_origin)

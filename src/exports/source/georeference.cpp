@@ -14,6 +14,7 @@
 #include "plumbline/cloud/io/cloud_io.hpp"
 #include "plumbline/core/json.hpp"
 #include "plumbline/core/output_file.hpp"
+#include "plumbline/exports/grid_place.hpp"
 
 namespace plumbline::exports {
 namespace {
@@ -42,12 +43,14 @@ core::Result<void> place_by_datum(const std::vector<double>& datum, const ProjFu
 core::Result<void> place_by_origin(const ExportOptions& options, const ProjFunctions& proj,
                                    Georeference& reference) {
   const std::vector<double>& origin = options.origin;
-  if (options.epsg == 0 || (origin.size() != 3 && origin.size() != 4)) {
-    return core::usage_error("--epsg N and --origin EAST,NORTH,HEIGHT[,DEGREES] go together; give both");
+  if (options.epsg == 0 || origin.size() < 3 || origin.size() > 5) {
+    return core::usage_error(
+        "--epsg N and --origin EAST,NORTH,HEIGHT[,DEGREES[,SCALE]] go together; give both");
   }
   reference.epsg = options.epsg;
   reference.origin = {origin[0], origin[1], origin[2]};
-  if (origin.size() == 4) reference.turn = -origin[3] * M_PI / 180.0;
+  if (origin.size() > 3) reference.turn = -origin[3] * M_PI / 180.0;
+  if (origin.size() > 4) reference.scale = origin[4];
   return proj.describe(options.epsg, reference);
 }
 
@@ -86,6 +89,27 @@ core::Result<std::optional<Georeference>> georeference_of(const ExportOptions& o
         reference.origin.x(), reference.origin.y(), reference.epsg, reference.name));
   }
   return reference;
+}
+
+core::Result<GridPlace> grid_at(int epsg, double east, double north) {
+  const auto& proj = core::part<ProjFunctions>();
+  if (!proj) return tl::unexpected(proj.error());
+  Georeference reference;
+  reference.epsg = epsg;
+  reference.origin = {east, north, 0.0};
+  if (auto known = (*proj)->describe(epsg, reference); !known) return tl::unexpected(known.error());
+  if (auto placed = (*proj)->place_at_origin(reference); !placed) return tl::unexpected(placed.error());
+  return GridPlace{epsg, reference.name, east, north, reference.turn, reference.scale};
+}
+
+core::Result<GridPlace> grid_of(const std::vector<double>& datum) {
+  const auto& proj = core::part<ProjFunctions>();
+  if (!proj) return tl::unexpected(proj.error());
+  Georeference reference;
+  const std::vector<double> on_the_globe(datum.begin(), datum.size() == 4 ? datum.end() - 1 : datum.end());
+  if (auto ok = place_by_datum(on_the_globe, **proj, reference); !ok) return tl::unexpected(ok.error());
+  return GridPlace{reference.epsg,       reference.name, reference.origin.x(),
+                   reference.origin.y(), reference.turn, reference.scale};
 }
 
 /// The cloud in world coordinates; the shift takes whole metres, so that floats stay exact.

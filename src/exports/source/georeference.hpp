@@ -39,6 +39,9 @@ struct ProjFunctions {
   /// Origin, turn and scale of a map whose origin is at (latitude, longitude) and whose x axis has this
   /// heading, all degrees. Errors (kUsage): the system does not cover it.
   core::Result<void> (*place)(double latitude, double longitude, double heading, Georeference& reference);
+  /// Turn and scale of a map that lies at the reference's origin and whose x axis is true north. Errors
+  /// (kUsage): the system does not cover it.
+  core::Result<void> (*place_at_origin)(Georeference& reference);
   /// True if the origin lies in the system's area of use, give or take 3 degrees, or that is not known.
   bool (*covers)(const Georeference& reference);
 };

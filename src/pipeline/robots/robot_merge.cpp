@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <utility>
 
@@ -158,11 +159,14 @@ Json section_of(const RobotMerge& merge) {
 
 MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor,
                           const mapping::MapFusionOptions& options, const core::Executor& executor,
-                          core::Log& log) {
+                          core::Log& log, const std::optional<mapping::MergeEvidence>& picked) {
   const std::vector<mapping::MapPart> maps = maps_of(parts);
   mapping::OverlapFinder places = mapping::learn_places(maps, options);
   std::vector<mapping::MergeEvidence> evidence =
       mapping::find_overlaps(maps, places.look_at_all(maps, executor), options, executor);
+  for (mapping::MergeEvidence& merge : evidence) {
+    if (picked && merge.a == picked->a && merge.b == picked->b) merge = *picked;
+  }
   if (anchor >= parts.size()) {
     anchor = largest_group(parts, mapping::connected_parts(parts.size(), evidence));
   }
@@ -201,6 +205,29 @@ MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor
     log.warning("merge: maps are moved into one frame, but not deformed: " + fused.refusal);
   result.map = map;
   return result;
+}
+
+std::shared_ptr<MapResult> kept_map(const std::vector<RobotMap>& parts, const maps::FusionState& state) {
+  auto kept = std::make_shared<MapResult>();
+  kept->map = parts.front().map;
+  kept->robots = parts.front().robots;
+  kept->frame_poses = parts.front().frame_poses;
+  take_poses_from_map(*kept);
+  kept->apart = components_apart(parts, {0});
+
+  if (state.covariances.empty()) {
+    kept->accuracy.missing = "the map was made without refine";
+    return kept;
+  }
+  for (const maps::KeyframePose& keyframe : kept->keyframes) {
+    const auto known = state.covariances.find({keyframe.id.robot, keyframe.stamp});
+    mapping::KeyframeAccuracy& accuracy = kept->accuracy.keyframes.emplace_back();
+    accuracy.keyframe = keyframe.id;
+    accuracy.covariance = known != state.covariances.end()
+                              ? known->second
+                              : geometry::Matrix6d::Constant(std::numeric_limits<double>::quiet_NaN());
+  }
+  return kept;
 }
 
 }  // namespace plumbline::pipeline

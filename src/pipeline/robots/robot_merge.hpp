@@ -3,6 +3,7 @@
 
 // Maps of several robots as one map result, with its summary.
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,9 +34,12 @@ struct MergedRobots {
 };
 
 /// Fuses the parts that are connected with `anchor`; if that is parts.size(), the connected group that has
-/// most keyframes.
+/// most keyframes. `picked`: a merge that the user knows.
 MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor,
                           const mapping::MapFusionOptions& options, const core::Executor& executor,
-                          core::Log& log);
+                          core::Log& log, const std::optional<mapping::MergeEvidence>& picked = {});
+
+/// The first part as it is, the others apart. `state`: its covariances, by number of robot and stamp.
+std::shared_ptr<MapResult> kept_map(const std::vector<RobotMap>& parts, const maps::FusionState& state);
 
 }  // namespace plumbline::pipeline

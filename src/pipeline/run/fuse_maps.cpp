@@ -50,10 +50,26 @@ core::Result<std::unique_ptr<maps::StoredMaps>> open_maps(const FuseRequest& req
     all.insert(all.begin(), request.into);
     return maps::StoredMaps::open(all, executor, maps::PartOrder::kAsGiven);
   }
-  auto maps = maps::StoredMaps::open(request.maps, executor);
+  const auto order = request.change ? maps::PartOrder::kAsGiven : maps::PartOrder::kByContent;
+  auto maps = maps::StoredMaps::open(request.maps, executor, order);
   if (!maps || request.anchor.empty()) return maps;
   if (const auto part = (*maps)->find_part(request.anchor); !part) return tl::unexpected(part.error());
   return maps;
+}
+
+/// The picks, by the order that the maps got. Errors (kUsage).
+core::Result<void> set_picks(const FuseRequest& request, maps::StoredMaps& maps) {
+  if (request.picks.empty()) return {};
+  if (maps.parts().size() != 2 || !request.into.empty())
+    return core::usage_error("--pick: joins two maps; fuse further ones afterwards");
+  std::error_code ec;
+  std::filesystem::path first = request.maps.front();
+  if (std::filesystem::is_directory(first, ec)) first /= maps::kStoreFile;
+  const bool swapped = !std::filesystem::equivalent(first, maps.parts().front().run.file(), ec);
+  std::vector<maps::Pick> picks;
+  for (const auto& [a, b] : request.picks) picks.push_back({swapped ? 1U : 0U, a, b});
+  maps.set_picks(std::move(picks));
+  return {};
 }
 
 RunContext context_of(const FuseRequest& request, const maps::StoredMaps& maps, const Graph& graph,
@@ -84,6 +100,13 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
 
   const auto maps = open_maps(request, executor);
   if (!maps) return tl::unexpected(maps.error());
+  if (auto picked = set_picks(request, **maps); !picked) return tl::unexpected(picked.error());
+  std::map<std::string, std::string> files;
+  if (request.change) {
+    auto changed = request.change(**maps);
+    if (!changed) return tl::unexpected(changed.error());
+    files = std::move(*changed);
+  }
   auto output = maps::OutputFolder::prepare(request.output, request.replace);
   if (!output) return tl::unexpected(output.error());
 
@@ -94,6 +117,11 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
   if (auto ok = announce_files(*graph, {}, *output); !ok) return tl::unexpected(ok.error());
   if (auto ok = core::write_file(output->path() / "config.yaml", context.store.configuration); !ok)
     return tl::unexpected(ok.error());
+  for (const auto& [name, text] : files) {
+    std::error_code ignored;
+    std::filesystem::create_directories((output->path() / name).parent_path(), ignored);
+    if (auto ok = core::write_file(output->path() / name, text); !ok) return tl::unexpected(ok.error());
+  }
 
   const auto report = run_graph(*graph, context, progress);
   if (!report) return tl::unexpected(output->explained(report.error()));

@@ -172,9 +172,13 @@ class FuseStage : public Stage {
     return dense;
   }
 
-  /// A map that was visited again keeps its frame.
+  [[nodiscard]] bool keeps_frame() const {
+    const maps::StoredMaps* maps = context_->input.stored_maps;
+    return context_->input.into || (maps != nullptr && maps->replaced());
+  }
+  /// A map that was visited again, or adjusted, keeps its frame.
   [[nodiscard]] UpFrame frame_of(const MapResult& map, const cloud::CloudConstPtr& cloud) const {
-    if (!context_->input.into || !map.name.empty()) return find_up(up_, yaw_, cloud, map.trajectory);
+    if (!keeps_frame() || !map.name.empty()) return find_up(up_, yaw_, cloud, map.trajectory);
     const maps::ResultFrame& frame = context_->input.stored_maps->parts().front().run.stored().result;
     return {frame.output_from_map, frame.upright ? "map" : "none", frame.upright ? "map" : "none"};
   }

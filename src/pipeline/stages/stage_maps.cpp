@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // maps: finished maps of robots; their clouds come one after another.
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <utility>
 
@@ -14,15 +17,35 @@
 namespace plumbline::pipeline {
 namespace {
 
+/// Warns of maps of one kind of camera of which one was brought to another scale.
+void warn_of_scales(const std::vector<RobotInfo>& robots, core::Log& log) {
+  constexpr double kOther = 0.001;   // difference that counts
+  constexpr double kLargest = 0.15;  // more is another unit
+  for (std::size_t i = 0; i < robots.size(); ++i) {
+    for (std::size_t j = i + 1; j < robots.size(); ++j) {
+      const sensor::Camera& a = robots[i].camera;
+      const sensor::Camera& b = robots[j].camera;
+      const bool alike = a.color.width == b.color.width && std::abs(a.color.fx / b.color.fx - 1.0) < 0.02;
+      const double differs = std::abs(a.depth_scale / b.depth_scale - 1.0);
+      if (!alike || differs < kOther || differs > kLargest) continue;
+      log.warning(
+          fmt::format("{} and {} are of different scale: their cameras' depth_scale differs by {:.2f} %; "
+                      "adjust both, or map the other with the adjusted camera.yaml",
+                      robots[i].name, robots[j].name, 100.0 * differs));
+    }
+  }
+}
+
 class MapsStage : public Stage {
  public:
   core::Result<void> start(const RunContext& context) override {
     log_ = context.log;
     maps_ = context.input.stored_maps;
-    into_ = context.input.into;
+    into_ = context.input.into || (maps_ != nullptr && maps_->replaced());
     if (maps_ == nullptr) {
       return core::usage_error("a pipeline that begins with finished maps is run by plumbline fuse");
     }
+    warn_of_scales(maps_->robots(), *log_);
     return {};
   }
   [[nodiscard]] std::size_t frames() const override { return maps_->clouds().size(); }

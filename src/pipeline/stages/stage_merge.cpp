@@ -17,6 +17,7 @@
 #include "plumbline/maps/stored_maps.hpp"
 #include "plumbline/pipeline/meeting_log.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
+#include "robots/picked_merge.hpp"
 #include "robots/robot_components.hpp"
 #include "robots/robot_merge.hpp"
 #include "stages/stages.hpp"
@@ -132,8 +133,10 @@ class MergeStage : public Stage {
       merged_.map->frame_poses = maps->maps.front().frame_poses;
       merged_.map->robots = maps->maps.front().robots;
       take_poses_from_map(*merged_.map);
-    } else {
-      merge(maps->maps);
+    } else if (context_->input.stored_maps != nullptr && context_->input.stored_maps->replaced()) {
+      merged_.map = kept_map(maps->maps, context_->input.stored_maps->parts().front().state);
+    } else if (auto merged = merge(maps->maps); !merged) {
+      return merged;
     }
 
     note_components(maps->maps);
@@ -207,14 +210,23 @@ class MergeStage : public Stage {
       components_.push_back(std::move(component));
     }
   }
-  void merge(const std::vector<RobotMap>& maps) {
+  core::Result<void> merge(const std::vector<RobotMap>& maps) {
     std::size_t anchor = maps.size();
     if (!context_->input.anchor.empty())
       anchor = *context_->input.stored_maps->find_part(context_->input.anchor);
     if (context_->input.into) anchor = 0;
-    merged_ = merge_robots(maps, anchor, options_, *context_->executor, *context_->log);
-    if (!live_) return;
-    for (RobotMerge& merge : merged_.merges) live_->date(merge);
+    std::optional<mapping::MergeEvidence> picked;
+    if (const maps::StoredMaps* stored = context_->input.stored_maps;
+        stored != nullptr && !stored->picks().empty()) {
+      auto known = picked_merge(*stored, maps, *context_->executor);
+      if (!known) return tl::unexpected(known.error());
+      picked = std::move(*known);
+    }
+    merged_ = merge_robots(maps, anchor, options_, *context_->executor, *context_->log, picked);
+    for (RobotMerge& merge : merged_.merges) {
+      if (live_) live_->date(merge);
+    }
+    return {};
   }
 
   const RunContext* context_ = nullptr;

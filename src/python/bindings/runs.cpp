@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Bindings of map and fuse, and of the mapper that is given its frames one by one.
+// Bindings of map, fuse, adjust, and of the mapper that is given its frames one by one.
+#include <fmt/format.h>
+#include <pybind11/eigen.h>
+#include <pybind11/stl.h>
+
 #include <memory>
+#include <tuple>
 
 #include "bindings.hpp"
+#include "plumbline/adjust/adjust.hpp"
 #include "plumbline/session/background.hpp"
 #include "plumbline/session/mapper.hpp"
 #include "watch.hpp"
@@ -106,6 +112,38 @@ std::unique_ptr<Run> start_fuse(const std::vector<fs::path>& maps, const fs::pat
                                [=](const FuseOptions& own) { return session::run_fuse(maps, output, own); });
 }
 
+/// Lengths as (p, q, metres, sigma), points as (p, world, sigma).
+using GivenLength = std::tuple<Eigen::Vector3d, Eigen::Vector3d, double, double>;
+using GivenPoint = std::tuple<Eigen::Vector3d, Eigen::Vector3d, double>;
+
+std::unique_ptr<Run> start_adjust(const fs::path& map, const fs::path& output,
+                                  const std::vector<GivenLength>& lengths,
+                                  const std::vector<GivenPoint>& points, int epsg, const fs::path& tags,
+                                  const fs::path& edits, const FuseOptions& options) {
+  adjust::AdjustRequest request;
+  request.epsg = epsg;
+  request.tags = tags;
+  request.edits = edits;
+  for (const auto& [p, q, length, sigma] : lengths) {
+    adjust::Control& control = request.control.emplace_back();
+    control.name = fmt::format("length {:g} m", length);
+    control.p = p;
+    control.q = q;
+    control.length_m = length;
+    control.sigma_m = sigma;
+  }
+  for (const auto& [p, world, sigma] : points) {
+    adjust::Control& control = request.control.emplace_back();
+    control.kind = adjust::ControlKind::kPoint;
+    control.name = fmt::format("point {}", request.control.size() - lengths.size());
+    control.p = p;
+    control.world = world;
+    control.sigma_m = sigma;
+  }
+  return std::make_unique<Run>(
+      options, [=](const FuseOptions& own) { return session::run_adjust(map, output, request, own); });
+}
+
 /// Calls of the thread that waits for a run.
 template <typename Class>
 void add_waiting(py::class_<Class>& run) {
@@ -183,6 +221,8 @@ void add_runs(py::module_& module) {
 
   // Runs of recordings and maps that exist
   module.def("start_map", &start_map, py::arg("input"), py::arg("output"), py::arg("options"));
+  module.def("start_adjust", &start_adjust, py::arg("map"), py::arg("output"), py::arg("lengths"),
+             py::arg("points"), py::arg("epsg"), py::arg("tags"), py::arg("edits"), py::arg("options"));
   module.def("start_fuse", &start_fuse, py::arg("maps"), py::arg("output"), py::arg("options"));
 }
 

@@ -27,11 +27,11 @@ from ._core import (
 from ._measures import Changes, Report, compare, evaluate_cloud, evaluate_trajectory, export, render
 from ._recording import Frame, Recording, camera, open
 from ._result import Keyframes, Landmarks, Length, Localization, Result, load
-from ._runs import Mapper, Tracked, fuse, localize, map
+from ._runs import Mapper, Tracked, adjust, fuse, localize, map
 from ._trajectory import Trajectory
 
 __all__ = [
-    "Camera", "Changes", "Cloud", "ConfigError", "Error", "FilterReport", "Frame", "InputError", "InternalError",
+    "adjust", "Camera", "Changes", "Cloud", "ConfigError", "Error", "FilterReport", "Frame", "InputError", "InternalError",
     "Keyframes", "Landmarks", "Length", "Localization", "Mapper", "OutputError", "Recording", "Report", "Result", "Tracked",
     "Trajectory", "UntrustworthyError", "__version__", "camera", "compare", "evaluate_cloud", "evaluate_trajectory", "export",
     "filter", "fuse", "load", "localize", "map", "open", "render",

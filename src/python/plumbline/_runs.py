@@ -158,6 +158,35 @@ def fuse(
     return Result(output)
 
 
+def adjust(
+    map: Union[PathLike, Result],  # noqa: A002
+    output: PathLike,
+    *,
+    lengths: Sequence[Sequence[Any]] = (),
+    points: Sequence[Sequence[Any]] = (),
+    epsg: int = 0,
+    tags: PathLike = "",
+    edits: PathLike = "",
+    threads: int = 0,
+    force: bool = False,
+    progress: Optional[Progress] = None,
+    **options: Any,
+) -> Result:
+    """Brings a finished map to scale and place by what was measured: `plumbline adjust` as a call.
+
+    lengths  (p, q, metres[, sigma]): the distance of two places of the map's results
+    points   (p, world[, sigma]): a place and its east, north, height, in the system `epsg` (0: the site's own grid)
+    tags     tags.yaml; edits: edits.yaml
+    """
+    folder = os.fspath(map.folder) if isinstance(map, Result) else path_of(map, "map")
+    wanted = _running(_core.FuseOptions(), "fuse", options, threads, force)
+    taped = [(p, q, metres, *rest) if rest else (p, q, metres, 0.005) for p, q, metres, *rest in lengths]
+    placed = [(p, world, *rest) if rest else (p, world, 0.005) for p, world, *rest in points]
+    run = _core.start_adjust(folder, path_of(output, "output"), taped, placed, epsg, os.fspath(tags), os.fspath(edits), wanted)
+    _finish(run, progress)
+    return Result(output)
+
+
 class Tracked:
     """Result of a frame that was fed. All properties but `done` and `dropped` wait for the tracker."""
 
