@@ -79,6 +79,7 @@ class Adjuster {
                    : control.seen_q.empty() ? found[2 * i + 1]
                                             : control.seen_q);
 
+      // Picks come from views of the cloud: one that lies beside every surface cannot be tied to keyframes.
       for (const auto& [place, place_views] :
            {std::pair{&control.p, &p_[i]}, std::pair{&control.q, &q_[i]}}) {
         if (!place_views->empty() || (place == &control.q && !control.pair())) continue;
@@ -103,61 +104,52 @@ class Adjuster {
   core::Result<void> place() {
     start_ = {};
     targets_.assign(request_.control.size(), Eigen::Vector3d::Zero());
-    WorldPlace world;
+
     if (!request_.datum.empty()) {
-      const auto grid = exports::grid_of(request_.datum);
-
-      if (!grid) return tl::unexpected(grid.error());
-      const auto north = exports::grid_at(grid->epsg, grid->east, grid->north);
-      if (!north) return tl::unexpected(north.error());
-      world = {grid->epsg, grid->name,  {grid->east, grid->north, 0.0},
-               grid->turn, grid->scale, north->turn - M_PI / 2};
-      if (request_.datum.size() == 4) world.origin.z() = request_.datum[3];
-
-      result_.world = world;
+      const auto world = place_of_datum();
+      if (!world) return tl::unexpected(world.error());
+      result_.world = *world;
     }
 
-    if (points() == 0) return {};
+    return points() == 0 ? core::Result<void>() : place_by_points();
+  }
 
+  /// The world that --datum gives: a place of the map's origin, and its turn from grid north.
+  [[nodiscard]] core::Result<WorldPlace> place_of_datum() const {
+    const auto grid = exports::grid_of(request_.datum);
+    if (!grid) return tl::unexpected(grid.error());
+    const auto north = exports::grid_at(grid->epsg, grid->east, grid->north);
+    if (!north) return tl::unexpected(north.error());
+
+    WorldPlace world{grid->epsg, grid->name,  {grid->east, grid->north, 0.0},
+                     grid->turn, grid->scale, north->turn - M_PI / 2};
+    if (request_.datum.size() == 4) world.origin.z() = request_.datum[3];
+    return world;
+  }
+
+  /// Scale, turn and shift in the plane by least squares over the points that are not left out.
+  core::Result<void> place_by_points() {
+    // Centres of gravity first: the shift is theirs, whatever the scale and the turn.
     Eigen::Vector3d in_world = Eigen::Vector3d::Zero(), in_map = Eigen::Vector3d::Zero();
     for_points([&](std::size_t i) {
       in_world += request_.control[i].world / static_cast<double>(points());
       in_map += request_.control[i].p / static_cast<double>(points());
     });
 
+    WorldPlace world;
     if (request_.epsg != 0) {
       const auto grid = exports::grid_at(request_.epsg, in_world.x(), in_world.y());
       if (!grid) return tl::unexpected(grid.error());
       world = {grid->epsg, grid->name, {}, 0.0, grid->scale, grid->turn - M_PI / 2};
     }
 
-    // Scale and turn in the plane, by least squares.
-    std::complex<double> both(1.0, 0.0);
-    if (points() > 1) {
-      std::complex<double> sum(0.0, 0.0);
-      double spread = 0.0;
-      for_points([&](std::size_t i) {
-        const Eigen::Vector3d m = request_.control[i].p - in_map;
-        const Eigen::Vector3d w = (request_.control[i].world - in_world) / world.scale;
-        sum += std::conj(std::complex<double>(m.x(), m.y())) * std::complex<double>(w.x(), w.y());
-        spread += m.head<2>().squaredNorm();
-      });
+    const auto both = scale_and_turn(in_world, in_map, world.scale);
+    if (!both) return tl::unexpected(both.error());
+    start_.scale = std::abs(*both);
+    world.turn = std::arg(*both);
 
-      if (spread < 0.01) return core::usage_error("--points: all lie at one place from above; choose others");
-      both = sum / spread;
-    }
-
-    if (!(std::abs(both) > 0.5 && std::abs(both) < 2.0)) {
-      return core::usage_error(
-          fmt::format("--points: the map would become {:.3g} times as large; look for columns that "
-                      "are swapped (map x, y, z, then east, north, height)",
-                      std::abs(both)));
-    }
-
-    start_.scale = std::abs(both);
-    world.turn = std::arg(both);
+    // The grid's scale acts on what is horizontal only; heights are metres as they are.
     const Eigen::Matrix3d turn = Eigen::AngleAxisd(world.turn, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-
     const Eigen::Vector3d grid(world.scale, world.scale, 1.0);
     world.origin = in_world - grid.asDiagonal() * (turn * (start_.scale * in_map));
     for (std::size_t i = 0; i < targets_.size(); ++i) {
@@ -167,6 +159,33 @@ class Adjuster {
 
     result_.world = world;
     return {};
+  }
+
+  /// Scale and turn in the plane as one complex number; 1 where a single point cannot tell them.
+  [[nodiscard]] core::Result<std::complex<double>> scale_and_turn(const Eigen::Vector3d& in_world,
+                                                                  const Eigen::Vector3d& in_map,
+                                                                  double grid_scale) const {
+    if (points() < 2) return std::complex<double>(1.0, 0.0);
+
+    std::complex<double> sum(0.0, 0.0);
+    double spread = 0.0;
+    for_points([&](std::size_t i) {
+      const Eigen::Vector3d m = request_.control[i].p - in_map;
+      const Eigen::Vector3d w = (request_.control[i].world - in_world) / grid_scale;
+      sum += std::conj(std::complex<double>(m.x(), m.y())) * std::complex<double>(w.x(), w.y());
+      spread += m.head<2>().squaredNorm();
+    });
+    if (spread < 0.01) return core::usage_error("--points: all lie at one place from above; choose others");
+
+    // A map is never half or twice as large as it should be: columns of the file are swapped then.
+    const std::complex<double> both = sum / spread;
+    if (!(std::abs(both) > 0.5 && std::abs(both) < 2.0)) {
+      return core::usage_error(
+          fmt::format("--points: the map would become {:.3g} times as large; look for columns that "
+                      "are swapped (map x, y, z, then east, north, height)",
+                      std::abs(both)));
+    }
+    return both;
   }
 
   template <typename Do>
@@ -185,10 +204,13 @@ class Adjuster {
 
     if (request_.control.empty()) return {};
 
+    // One observation leaves at a time, as a blunder spreads over the residuals of its neighbours. If the
+    // next worst is nearly as bad, and fits once the worst is gone, nothing tells which of the two is wrong.
     std::optional<std::size_t> alternative;
     std::size_t last = 0;
     for (std::size_t removed = 0;; ++removed) {
       converge();
+
       std::optional<std::size_t> worst, second;
       for (std::size_t k = 0; k < solved_.used.size(); ++k) {
         const std::size_t i = solved_.used[k];
@@ -291,6 +313,8 @@ class Adjuster {
     apply(total_, stored_.result.output_from_map, map, frames);
 
     if (!request_.control.empty()) {
+      // The part of the correction that no similarity has, by the correlation of each keyframe with the
+      // observations.
       const Eigen::VectorXd motions = solved_.signal * solved_.solution.weights;
       mapping::KeyframePoses poses;
       double sum = 0.0;
@@ -306,6 +330,8 @@ class Adjuster {
 
       result_.mean_bend_m = sum / static_cast<double>(std::max<std::size_t>(1, poses.size()));
       mapping::move_keyframes(map, poses);
+
+      // Residuals are told as the moved map has them, and not as the linear solution promised.
       for (std::vector<PlaceViews>* all : {&p_, &q_}) {
         for (PlaceViews& place_views : *all) {
           for (auto& [id, in_camera] : place_views) in_camera *= total_.scale;

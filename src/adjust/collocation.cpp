@@ -11,8 +11,8 @@ CollocationSolution solve_collocation(const CollocationProblem& problem) {
   const Eigen::MatrixXd inverse =
       problem.covariance.ldlt().solve(Eigen::MatrixXd::Identity(count, count).eval());
 
+  // Unknowns by generalised least squares, then the observations' weights with them taken out.
   CollocationSolution solution;
-
   const Eigen::MatrixXd weighted = inverse * problem.g;
   Eigen::MatrixXd normal = problem.g.transpose() * weighted;
   normal.diagonal() += problem.prior_sigma.cwiseAbs2().cwiseInverse();
@@ -27,6 +27,7 @@ CollocationSolution solve_collocation(const CollocationProblem& problem) {
   for (const int rows : problem.rows) {
     const Eigen::MatrixXd own = reduced.block(first, first, rows, rows);
     const Eigen::MatrixXd spread = own.ldlt().solve(Eigen::MatrixXd::Identity(rows, rows).eval());
+
     CollocationCheck& check = solution.checks.emplace_back();
     check.rows = rows;
     check.difference = spread * solution.weights.segment(first, rows);

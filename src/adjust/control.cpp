@@ -67,9 +67,12 @@ core::Result<Control> length_of(const std::array<std::string, 3>& words) {
     (i == 0 ? control.p : control.q) = *place;
   }
 
+  // The standard deviation follows its length behind "+-", in any unit of length; a tape's is assumed without
+  // it.
   const std::size_t sign = words[2].find("+-");
   const auto length = metres_of(words[2].substr(0, sign));
   const auto sigma = sign == std::string::npos ? control.sigma_m : metres_of(words[2].substr(sign + 2));
+
   if (!length || !sigma || !(*length > 0.0) || !(*sigma > 0.0)) {
     return core::usage_error(
         fmt::format("--length: '{}' is not a length; write 4.57m, or 4.57m+-3mm with its "

@@ -120,6 +120,8 @@ Network::Solved Network::solve(const std::vector<bool>& left_out, const std::vec
   problem.g = Eigen::MatrixXd::Zero(count, kUnknowns);
   Eigen::VectorXd noise(count);
   Eigen::MatrixXd by_keyframes = Eigen::MatrixXd::Zero(covariance.size(), count);
+
+  // Each observation by the similarity and by the poses of the keyframes that saw its places.
   Eigen::Index first = 0;
   for (std::size_t k = 0; k < solved.used.size(); ++k) {
     const std::size_t i = solved.used[k];
@@ -137,6 +139,7 @@ Network::Solved Network::solve(const std::vector<bool>& left_out, const std::vec
     first += rows;
   }
 
+  // The map's own uncertainty is noise of the observations here; the similarity is what explains all of them.
   solved.signal = covariance.times(by_keyframes);
   problem.covariance = by_keyframes.transpose() * solved.signal;
   problem.covariance.diagonal() += noise;

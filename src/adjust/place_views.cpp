@@ -50,9 +50,10 @@ std::vector<PlaceViews> find_place_views(const maps::StoredMaps& maps, std::size
   const maps::StoredMap& stored = part.run.stored();
   const core::KeyframeId root = maps::main_root(stored.map, stored.frames);
   std::vector<std::vector<std::optional<Seen>>> seen(part.views.size());
+
+  // Keyframes of the main part only: the others lie in a frame of their own.
   executor.parallel_for(part.views.size(), [&](std::size_t view) {
     const core::KeyframeId id = part.views.keyframes[view];
-
     if (!id.valid() || !stored.map.has_keyframe(id) || maps::root_of(stored.map, id) != root) return;
     const auto surface = part.views.surface(view);
     const bool kept = surface && surface->has_value();
@@ -60,6 +61,7 @@ std::vector<PlaceViews> find_place_views(const maps::StoredMaps& maps, std::size
                          stored.map.camera_from_world(id) * stored.result.output_from_map.inverse(), places);
   });
 
+  // The views nearest to the surface, then the closest ones, whose depth is the best.
   std::vector<PlaceViews> place_views(places.size());
   for (std::size_t i = 0; i < places.size(); ++i) {
     std::vector<std::tuple<long, double, std::size_t>> best;  // centimetres off, range

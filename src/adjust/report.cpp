@@ -47,7 +47,6 @@ std::string json_of(const Adjustment& a) {
   json["bend"] = {{"mean_m", a.mean_bend_m}, {"largest_m", a.largest_bend_m}};
 
   json["observations"] = nlohmann::ordered_json::array();
-
   for (const ControlFinding& f : a.findings) {
     json["observations"].push_back({{"name", f.name},
                                     {"before_m", f.before_m},
@@ -122,8 +121,9 @@ std::function<core::Result<std::map<std::string, std::string>>(maps::StoredMaps&
           &log](maps::StoredMaps& maps) -> core::Result<std::map<std::string, std::string>> {
     std::map<std::string, std::string> files;
     AdjustRequest own = request;
-    std::vector<Tag> tags;
 
+    // Tags become observations like those of the command line.
+    std::vector<Tag> tags;
     if (!request.tags.empty()) {
       const auto told = read_tags(request.tags);
       if (!told) return tl::unexpected(told.error());
@@ -143,6 +143,7 @@ std::function<core::Result<std::map<std::string, std::string>>(maps::StoredMaps&
       if (finding.left_out) log.warning(finding.name + ": " + check_text(finding));
     }
 
+    // Files that are in metres of the map change their scale with it.
     files["adjust.json"] = adjustment->json;
     if (!request.tags.empty())
       files["tags.csv"] = tags_table(tags, maps.parts().front().run.stored(), adjustment->scale);
@@ -152,6 +153,7 @@ std::function<core::Result<std::map<std::string, std::string>>(maps::StoredMaps&
       files[folder + "camera.yaml"] = camera_text(robot, adjustment->scale_sigma / adjustment->scale);
     }
 
+    // Edits given here replace those kept beside the map.
     std::error_code ec;
     std::filesystem::path edits = request.edits;
     if (edits.empty()) edits = maps.parts().front().run.file().parent_path() / exports::kEditsFile;
@@ -176,14 +178,16 @@ core::Result<std::vector<std::string>> fusion_settings(const std::filesystem::pa
         "that tracks, without store.enabled=off");
   }
 
+  // The cloud is made again as the map's own run made it; only settings that differ from the defaults are
+  // passed on.
   const auto run = maps::StoredRun::open_main(*place);
   if (!run) return tl::unexpected(run.error());
+
   cloud::DenseFusionOptions options = run->fusion_options(), usual;
   core::OptionTable table, defaults;
   options.declare(table);
   usual.declare(defaults);
   std::vector<std::string> settings{"refine.adjust=off"};
-
   for (const core::OptionSpec& spec : table.specs()) {
     const std::string value = table.value(spec.key);
     if (value != defaults.value(spec.key)) settings.push_back("fuse." + spec.key + "=" + value);

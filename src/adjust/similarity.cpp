@@ -60,6 +60,7 @@ void apply(const Similarity& similarity, const Rigid3& output_from_map, maps::Ma
            std::vector<maps::FramePose>& frames) {
   const double scale = similarity.scale;
   const Rigid3 map_from_output = output_from_map.inverse();
+  // The similarity is told in the frame of results; poses and landmarks live in the map's own.
   const Eigen::Matrix3d turn =
       map_from_output.rotation * similarity.motion.rotation * output_from_map.rotation;
   const auto moved = [&](const Eigen::Vector3d& p) {

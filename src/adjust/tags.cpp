@@ -65,9 +65,9 @@ Tag tag_of(int id, const PlaceViews& seen, const maps::StoredMap& map) {
   tag.id = id;
   const std::vector<Eigen::Vector3d> places = placed(seen, map, 1.0);
 
+  // Views far from the median see a copy of the tag, or read another tag's number.
   const Eigen::Vector3d median = median_of(places);
   double squares = 0.0;
-
   for (std::size_t i = 0; i < places.size(); ++i) {
     if ((places[i] - median).norm() > kOnePlace_m) continue;
     tag.seen.push_back(seen[i]);
@@ -88,6 +88,7 @@ void read_entry(const core::ConfigNode& node, TagControl& told, core::ConfigProb
   Control control;
   double sigma = control.sigma_m, length = 0.0, number = -1.0;
   std::vector<double> pair, world;
+
   core::OptionTable table;
   table.number("sigma", sigma, {1e-5, 10.0}, "m", "");
   table.number("length", length, {0.05, 1e4}, "m", "");
@@ -104,7 +105,6 @@ void read_entry(const core::ConfigNode& node, TagControl& told, core::ConfigProb
     told.ids.emplace_back(static_cast<int>(number), -1);
   } else if (pair.size() == 2 && length > 0.0) {
     control.length_m = length;
-
     control.name = fmt::format("tags {:.0f} to {:.0f}", pair[0], pair[1]);
     told.ids.emplace_back(static_cast<int>(pair[0]), static_cast<int>(pair[1]));
   } else {
@@ -141,8 +141,8 @@ core::Result<std::vector<Tag>> find_tags(const maps::StoredMaps& maps, const std
   const maps::StoredPart& part = maps.parts().front();
   const maps::StoredMap& stored = part.run.stored();
 
+  // Whole pictures of the main part's keyframes; where a tag's middle has depth, it has a place.
   const core::KeyframeId root = maps::main_root(stored.map, stored.frames);
-
   std::vector<std::vector<std::pair<int, Eigen::Vector3d>>> found(part.views.size());
   std::vector<std::uint8_t> looked(part.views.size(), 0);
   executor.parallel_for(part.views.size(), [&](std::size_t view) {
@@ -154,7 +154,6 @@ core::Result<std::vector<Tag>> find_tags(const maps::StoredMaps& maps, const std
 
     const auto picture = dataset::decode_jpeg_bytes(*file);
     const auto surface = part.views.surface(view);
-
     if (!picture || !surface || !*surface) return;
     looked[view] = 1;
 
@@ -175,6 +174,7 @@ core::Result<std::vector<Tag>> find_tags(const maps::StoredMaps& maps, const std
                              "store.images=whole");
   }
 
+  // Sorted by number, so that the order in which views were looked at leaves no trace.
   std::map<int, PlaceViews> seen;
   for (std::size_t view = 0; view < found.size(); ++view) {
     for (const auto& [id, place] : found[view]) seen[id].emplace_back(part.views.keyframes[view], place);

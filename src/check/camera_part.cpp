@@ -43,18 +43,21 @@ std::vector<Vector6d> at_anchors(const std::vector<WorldShift>& shifts, std::siz
                                  const std::vector<GraphAnchor>& anchors) {
   std::vector<Vector6d> motions;
   for (const GraphAnchor& anchor : anchors) {
+    // The keyframes of the same path around the anchor; at its ends there is only one.
     const WorldShift *before = nullptr, *after = nullptr;
     for (const WorldShift& shift : shifts) {
       if (shift.way != anchor.way) continue;
       if (shift.stamp <= anchor.stamp) before = &shift;
       if (shift.stamp >= anchor.stamp && after == nullptr) after = &shift;
     }
+
     if (before == nullptr) before = after;
     if (after == nullptr) after = before;
     if (before == nullptr) {
       motions.emplace_back(Vector6d::Zero());
       continue;
     }
+
     const double gap_s = after->stamp - before->stamp;
     const double at = gap_s > 0.0 ? (anchor.stamp - before->stamp) / gap_s : 0.0;
     motions.emplace_back((1.0 - at) * before->motions[number] + at * after->motions[number]);
@@ -67,14 +70,17 @@ std::vector<Vector6d> at_anchors(const std::vector<WorldShift>& shifts, std::siz
 CameraPart camera_part(const CheckInput& input, const std::vector<GraphAnchor>& anchors) {
   const std::vector<WorldShift> shifts = in_world(input);
   if (shifts.empty() || anchors.size() < 3) return {};
+
   CameraPart part;
   part.draws.resize(anchors.size());
   for (auto& draws : part.draws) draws.fill(Vector6d::Zero());
 
+  // One number of the camera after another: what it moves all anchors by together is no error of the path.
   double squares = 0.0;
   for (std::size_t number = 0; number < shifts.front().motions.size(); ++number) {
     const auto motions = without_whole(anchors, at_anchors(shifts, number, anchors));
     const auto factors = factors_of(number + 1);
+
     for (std::size_t a = 0; a < anchors.size(); ++a) {
       const Vector6d& motion = motions[a];
       squares +=

@@ -93,6 +93,7 @@ std::string to_json(const CheckReport& report) {
                           {"p90_m", rounded_m(one.p90_m)},
                           {"unexplained_m", rounded_m(one.unexplained_m)}};
   }
+
   Json tears = Json::array();
   for (const BadPlace& tear : report.tears) tears.push_back(json_of(tear));
   Json along = Json::array();

@@ -49,6 +49,9 @@ double normal(core::SplitMix& random) {
 std::vector<AnchorSamples> possible_errors(const CheckReport& report, const std::vector<GraphAnchor>& anchors,
                                            const GraphReport& graph, const CameraPart& camera) {
   if (graph.draws.empty()) return {};
+
+  // The corrections found and the camera's part have a form of their own; draws of the graph make up the
+  // rest.
   const double share = found_share(report), of_camera = camera_share();
   const double known_m = std::hypot(share * graph.rms_m, of_camera * camera.rms_m);
   const double rest_m = std::sqrt(std::max(0.0, report.expected_m * report.expected_m - known_m * known_m));

@@ -205,6 +205,7 @@ class Check {
     }
     report.noise = {noise_.a, noise_.b};
     report.told_m = input_.told_m;
+
     std::vector<double> distances;
     for (const Outline& outline : outlines_) distances.push_back(outline.distance_m);
     if (!distances.empty()) report.distance_m = core::median(std::move(distances));
@@ -365,6 +366,7 @@ class Check {
     constexpr double kMostlyFound = 0.6;
     constexpr double kContradicted_rad = 0.05;  // of what lies before the camera a shift is much like a turn
     constexpr std::size_t kAround = 15;
+
     if (speeds[i] > kFastest_m_s) return true;
     const std::size_t begin = i > kAround ? i - kAround : 0, end = std::min(speeds.size(), i + kAround + 1);
     std::vector<double> around(speeds.begin() + static_cast<std::ptrdiff_t>(begin),

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// How much of a path nothing that was seen twice ties.
+// The length of a path that nothing seen twice ties to the rest of it.
 #include <vector>
 
 #include "plumbline/check/self_check.hpp"

@@ -18,7 +18,7 @@ constexpr double kSeconds = 0.5;
 constexpr double kP95 = 1.8;
 /// Standard deviations are told relative to the first keyframe: fitted to each other paths differ by less.
 constexpr double kTold = 0.5;
-/// Where the camera's part is known it takes the place of what the estimate tells; pairs see some of it, too.
+/// The camera's part, if it is known, takes the place of what the estimate tells; pairs see some of it, too.
 constexpr double kCamera = 1.4;
 constexpr double kBesideCamera = 0.7;
 /// Share of the length that nothing ties by which it may drift.

@@ -122,8 +122,8 @@ void FrameAligner::match_landmarks(const AlignmentRound& round) {
   result_.doubtful.clear();
 
   if (in_.options.points) {
-    result_.points = match_points(in_.map, in_.around.local_map.points, {features(), in_.camera, pose}, radius, how,
-                                  &result_.visible_points);
+    result_.points = match_points(in_.map, in_.around.local_map.points, {features(), in_.camera, pose},
+                                  radius, how, &result_.visible_points);
 
     // Corners are aligned once outliers are rejected
     if (how.align && round.reject_outliers)
@@ -132,8 +132,8 @@ void FrameAligner::match_landmarks(const AlignmentRound& round) {
   }
 
   if (in_.options.lines) {
-    result_.lines = match_lines(in_.map, in_.around.local_map.lines, {features(), in_.camera, pose}, radius, how,
-                                &result_.visible_lines);
+    result_.lines = match_lines(in_.map, in_.around.local_map.lines, {features(), in_.camera, pose}, radius,
+                                how, &result_.visible_lines);
     problem_.lines = line_terms(in_.map, result_.lines, features(), kLineSigma_px);
   }
 }
