@@ -78,9 +78,10 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_input(const std::string
                                                                const core::Executor& executor,
                                                                core::Log& log) {
   if (dataset::is_live_address(input)) return open_live_input(input, options, log);
-  if (!options.live.record.empty() || options.live.for_s < kForever_s) {
-    return core::usage_error(
-        fmt::format("{}: is a recording; --record and --for are for live cameras (ros2://DOMAIN)", input));
+  if (!options.live.record.empty() || options.live.for_s < kForever_s ||
+      options.live.most_waiting_bytes != dataset::kMostWaitingBytes) {
+    return core::usage_error(fmt::format(
+        "{}: is a recording; --record, --for and --max-memory are for live cameras (ros2://DOMAIN)", input));
   }
 
   if (!synth::is_synth_url(input)) return dataset::open_recording(input, options, log);

@@ -134,7 +134,13 @@ def messages(case):
         text = case.run("map", case.address(), "-o", case.work / "short", "--for", "2s", "--record", case.work / "short.txt",
                         code=2)
         check("ends in .mcap" in text, text)
-        text = case.run("map", case.address(), "-o", case.work / "short", "--for", "2s")
+        for size, word in (("1MB", "64MB or more"), ("much", "much"), ("100 parsecs", "unit")):
+            text = case.run("map", case.address(), "-o", case.work / "short", "--max-memory", size, code=2)
+            check(word in text, text)
+        text = case.run("map", room, "-o", case.work / "short", "--max-memory", "128MB", code=2)
+        check("are for live cameras" in text, text)
+        text = case.run("map", case.address(), "-o", case.work / "short", "--for", "2s", "--max-memory", "128MB")
+        check("up to 128 MB of frames wait" in text, text)
         check("received frames were mapped" in text, text)
     finally:
         playing.send_signal(signal.SIGINT)
