@@ -96,8 +96,8 @@ core::Result<void> MeetingLog::note(const MeetingEvent& event, const std::vector
   const std::string keyframe = fmt::format("keyframe {} of {}", event.keyframe.index,
                                            names[static_cast<std::size_t>(event.keyframe.robot)]);
 
-  // Places that look similar are often different ones: only meetings concern users, all before is for
-  // debugging.
+  // Places that look similar are often different ones: users are informed of meetings only, and the steps
+  // before are for debugging.
   switch (event.step) {
     case MeetingStep::kNone:
       return {};

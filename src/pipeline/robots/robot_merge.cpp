@@ -152,7 +152,7 @@ Json section_of(const RobotMerge& merge) {
     entry["alternative_overlay"] = overlay_section(e.ambiguity.alternative_overlap);
   }
 
-  // Refused merges have no relative pose. Negative times are not known, or after mapping.
+  // A refused merge has no relative pose; a negative time is not known, or the merge came after mapping.
   if (e.accepted) add_alignment(e.alignment, entry);
   if (merge.time_s >= 0.0) entry["time_s"] = rounded(merge.time_s);
   if (merge.evident_s >= 0.0) entry["evident_s"] = rounded(merge.evident_s);
