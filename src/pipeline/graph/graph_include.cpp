@@ -113,7 +113,7 @@ class Includer {
       return own.find("include") == nullptr ? std::optional(std::move(own)) : std::nullopt;
     }
 
-    // The file counts as open until its includes are read: an include of an open file would never end.
+    // The file counts as open until its includes are read: an include of an open file closes a circle.
     open_.push_back(fs::weakly_canonical(file));
     ConfigNode base;
     base.kind = Kind::kMap;
@@ -165,7 +165,7 @@ class Includer {
 
     const fs::path canonical = fs::weakly_canonical(file);
 
-    // A circle of includes would be read without end; the message shows it from file to file.
+    // A circle would run into the limit of files; the message shows it from file to file instead.
     const auto again = std::find(open_.begin(), open_.end(), canonical);
     if (again != open_.end()) {
       std::vector<std::string> circle;

@@ -79,8 +79,8 @@ class StoreStage : public Stage {
       clouds.push_back(std::move(*waiting));
     }
 
-    // Frames wait for the next keyframe, so that a store always ends with a keyframe and can be continued
-    // there.
+    // Frames wait for the next keyframe, so that the store of an interrupted run ends with a keyframe and can
+    // be continued there.
     if (track != nullptr) {
       maps::StoreStep& step = steps_[track->robot];
       step.robot = track->robot;
