@@ -101,6 +101,8 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
   const auto maps = open_maps(request, executor);
   if (!maps) return tl::unexpected(maps.error());
   if (auto picked = set_picks(request, **maps); !picked) return tl::unexpected(picked.error());
+
+  // A change, such as a scale from control points, comes first: if it fails, no output folder is touched.
   std::map<std::string, std::string> files;
   if (request.change) {
     auto changed = request.change(**maps);
@@ -114,6 +116,8 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
   context.executor = &executor;
   context.log = &log;
   context.stop = stop;
+
+  // The folder notes the files that it will hold, so that replacing it later removes these and nothing else.
   if (auto ok = announce_files(*graph, {}, *output); !ok) return tl::unexpected(ok.error());
   if (auto ok = core::write_file(output->path() / "config.yaml", context.store.configuration); !ok)
     return tl::unexpected(ok.error());
