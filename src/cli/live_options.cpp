@@ -35,9 +35,10 @@ void add_live_options(CLI::App& command, pipeline::MapRequest& request) {
                   "when mapped")
       ->type_name("FILE.mcap");
   command
-      .add_option("--max-memory", live.most_waiting_bytes,
-                  "Live camera: memory of the frames that wait to be mapped; what comes beyond is dropped and "
-                  "counted (default: 1GB)")
+      .add_option(
+          "--max-memory", live.most_waiting_bytes,
+          "Live camera: memory of the frames that wait to be mapped; what comes beyond is dropped and "
+          "counted (default: 1GB)")
       ->type_name("SIZE")
       ->transform(CLI::AsSizeValue(false))
       ->check(queue_problem);
