@@ -33,6 +33,7 @@ FrameReport FrameReport::of(const sensor::RgbdFrame& frame, const tracking::Trac
   report.frame_index = frame.index;
   report.stamp = frame.stamp;
   report.state = track.state;
+  report.loss = track.loss;
   report.reference = track.reference;
   report.points = track.estimate.points;
   report.lines = track.estimate.lines;
@@ -68,8 +69,10 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& featur
                                                options_.loops.enabled ? &relocalisation_ : nullptr);
   const auto never_found = relocalisation_.judge(map_, frame, *features, lost_before, track);
   if (never_found) tracker_.take_back(*never_found);
-  if (track.state == tracking::TrackState::kTracked && !frames_.is_accurate(track))
+  if (track.state == tracking::TrackState::kTracked && !frames_.is_accurate(track)) {
     track.state = tracking::TrackState::kLost;
+    track.loss = tracking::Loss::kInaccurate;
+  }
 
   // A lost frame is also searched in the maps of other robots.
   if (tracker_.lost().astray) {

@@ -120,21 +120,24 @@ bool Tracker::jumps(double stamp, const Rigid3& camera_from_world) const {
   return jump.translation.norm() > kMost_m || geometry::rotation_angle(jump.rotation) > kMost_rad;
 }
 
-std::optional<TrackResult> Tracker::track_with_motion_model(const Scene& scene,
-                                                            const TrackedImage& image) const {
+Tracker::Found Tracker::track_with_motion_model(const Scene& scene, const TrackedImage& image) const {
   constexpr double kClearly = 1.15;  // more support than the pose near by, or than the likeliest one
-  if (motion_.expired()) return std::nullopt;
+  if (motion_.expired()) return tl::unexpected(Loss::kNoPlace);
 
   const features::FrameFeatures& features = *image.synchronised;
   const PoseHypotheses hypotheses = pose_hypotheses(scene, image.frame, features);
+
   const auto tracked = [&](const TrackResult& attempt) {
     return attempt.state == TrackState::kTracked &&
            (!motion_.outdated() || passes_strict_check(attempt, features));
   };
 
   std::optional<TrackResult> best;
+  Loss loss = Loss::kNoPlace;  // of the attempt with most support among those that failed
+  double most = -1.0;
   for (const Rigid3& hypothesis : hypotheses.camera_from_world) {
     TrackResult attempt = align(scene, image, hypothesis, motion_.search_radius_px());
+
     // Among similar landmarks, such as the keys of a keyboard, wrong matches of the wide search can pull the
     // pose beyond the reach of the fine rounds: the right ones around the hypothesis would never be tried.
     if (jumps(image.frame.stamp, attempt.camera_from_world)) {
@@ -143,13 +146,19 @@ std::optional<TrackResult> Tracker::track_with_motion_model(const Scene& scene,
         attempt = std::move(near);
     }
 
+    if (!tracked(attempt) && support(attempt) > most) {
+      most = support(attempt);
+      loss = attempt.state == TrackState::kTracked ? Loss::kUnlikely : attempt.loss;
+    }
+
     const double share = hypotheses.searched ? 1.0 : kClearly;
     if (tracked(attempt) && (!best || support(attempt) > share * support(*best))) best = std::move(attempt);
     // A pose that jumps may fit another copy of the same landmarks: the other hypotheses are tried as well.
     if (best && !hypotheses.searched && !jumps(image.frame.stamp, best->camera_from_world)) break;
   }
 
-  return best;
+  if (!best) return tl::unexpected(loss);
+  return *std::move(best);
 }
 
 std::vector<Tracker::PlaceHypothesis> Tracker::place_hypotheses(
@@ -187,7 +196,7 @@ std::vector<Tracker::PlaceHypothesis> Tracker::place_hypotheses(
   return hypotheses;
 }
 
-std::optional<TrackResult> Tracker::relocalise(const Scene& scene, const TrackedImage& image) {
+Tracker::Found Tracker::relocalise(const Scene& scene, const TrackedImage& image) {
   const features::FrameFeatures& features = *image.synchronised;
   const std::vector<PlaceHypothesis> hypotheses = place_hypotheses(scene, features);
   LocalMap& local_map = scene.around.local_map;
@@ -197,16 +206,18 @@ std::optional<TrackResult> Tracker::relocalise(const Scene& scene, const Tracked
   for (const PlaceHypothesis& place : hypotheses) {
     local_map = build_local_map(scene.map, place.keyframe, options_.local_map);
     TrackResult attempt = align(scene, image, place.camera_from_world, place.coarse ? 24.0 : 10.0);
+
     if (attempt.state != TrackState::kTracked || attempt.dead_reckoned) continue;
     if (place.coarse && !passes_strict_check(attempt, features)) continue;
     const FoundFrame found{image.frame, features, place.keyframe, attempt.camera_from_world};
     if (scene.relocaliser != nullptr && !scene.relocaliser->is_place(scene.map, lost(), found)) continue;
+
     attempt.relocalised = true;
     motion_.reset();
     return attempt;
   }
   local_map = std::move(before);  // a mistake must not take the surroundings away
-  return std::nullopt;
+  return tl::unexpected(Loss::kNoPlace);
 }
 
 /// Stricter check, because places can look alike: a pose that only the thumbnail suggested must be confirmed

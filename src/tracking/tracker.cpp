@@ -33,6 +33,26 @@ const char* to_string(TrackState state) {
   return "";
 }
 
+const char* to_string(Loss loss) {
+  switch (loss) {
+    case Loss::kNone:
+      return "";
+    case Loss::kFewAgree:
+      return "too few features and surfaces agree";
+    case Loss::kFreeDirection:
+      return "a direction is free";
+    case Loss::kUnlikely:
+      return "fits too little of what should be seen";
+    case Loss::kNoPlace:
+      return "looks like no known place";
+    case Loss::kUnconfirmed:
+      return "place not confirmed";
+    case Loss::kInaccurate:
+      return "known to centimetres only";
+  }
+  return "";
+}
+
 void TrackerOptions::declare(core::OptionTable& table) {
   table.boolean("depth", depth, "Align depth with the surfaces of the local map");
   table.boolean("align_stamps", align_stamps,
@@ -75,8 +95,12 @@ TrackResult Tracker::track(const maps::Map& map, Surroundings& around, const sen
 
   // After a long loss, relocalisation comes first
   const bool outdated = motion_.outdated();
-  auto found = outdated ? relocalise(scene, image) : track_with_motion_model(scene, image);
-  if (!found) found = outdated ? track_with_motion_model(scene, image) : relocalise(scene, image);
+  Found found = outdated ? relocalise(scene, image) : track_with_motion_model(scene, image);
+  if (found) return concluded(scene, image, std::move(found));
+
+  // The reason against the pose near by says more than that no place looks like the image
+  Found other = outdated ? track_with_motion_model(scene, image) : relocalise(scene, image);
+  if (other || found.error() == Loss::kNoPlace) found = std::move(other);
   return concluded(scene, image, std::move(found));
 }
 
@@ -96,9 +120,8 @@ TrackedImage Tracker::image_of(const sensor::RgbdFrame& frame, const Features& f
   return {frame, features, motion, synchronised(features, frame.depth, camera_, motion)};
 }
 
-TrackResult Tracker::concluded(const Scene& scene, const TrackedImage& image,
-                               std::optional<TrackResult> found) {
-  TrackResult result = found ? *std::move(found) : missed(image.frame);
+TrackResult Tracker::concluded(const Scene& scene, const TrackedImage& image, Found found) {
+  TrackResult result = found ? *std::move(found) : missed(image.frame, found.error());
   if (found) {
     if (result.features == nullptr) result.features = image.synchronised;
     record(image.frame, result);
@@ -115,8 +138,9 @@ TrackResult Tracker::initialise(const sensor::RgbdFrame& frame, const Features& 
   return result;
 }
 
-TrackResult Tracker::missed(const sensor::RgbdFrame& frame) {
+TrackResult Tracker::missed(const sensor::RgbdFrame& frame, Loss loss) {
   TrackResult result;
+  result.loss = loss;
   result.camera_from_world = motion_.predict(frame.stamp);
   motion_.lost();
   return result;

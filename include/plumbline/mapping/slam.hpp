@@ -28,6 +28,7 @@ struct FrameReport {
   std::int64_t frame_index = -1;
   double stamp = 0.0;
   tracking::TrackState state = tracking::TrackState::kLost;
+  tracking::Loss loss = tracking::Loss::kNone;
   core::KeyframeId reference;  ///< keyframe the pose is relative to
   core::KeyframeId keyframe;   ///< made of this frame; invalid: none
   core::KeyframeId component;  ///< root of the component at the time of tracking; invalid: in none

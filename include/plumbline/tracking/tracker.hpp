@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <tl/expected.hpp>
 #include <utility>
 #include <vector>
 
@@ -30,6 +31,19 @@ namespace plumbline::tracking {
 
 enum class TrackState { kInitialising, kTracked, kLost };
 const char* to_string(TrackState state);
+
+/// Why a frame has no pose. Of several poses that were tried the reason is that of the one with most support.
+enum class Loss {
+  kNone,           ///< it has a pose
+  kFewAgree,       ///< too few features, and too little of the surface, agree with any pose
+  kFreeDirection,  ///< measurements leave a direction free, and the motion model has held it for too long
+  kUnlikely,       ///< after a gap the pose must fit most of what should be seen, and does not
+  kNoPlace,        ///< the motion is not known any more, and no place looks like the image
+  kUnconfirmed,    ///< found at a place that later frames did not confirm
+  kInaccurate      ///< the pose is known to centimetres only
+};
+/// The text of frames.csv; "" for kNone.
+const char* to_string(Loss loss);
 
 struct TrackerOptions {
   bool points = true;
@@ -55,6 +69,7 @@ struct TrackerOptions {
 /// Result of tracking one frame.
 struct TrackResult {
   TrackState state = TrackState::kLost;
+  Loss loss = Loss::kNone;
   core::KeyframeId reference;  ///< keyframe near which the camera is
   geometry::Rigid3 camera_from_world;
   geometry::Rigid3 depth_from_camera;  ///< motion between the stamps of colour and depth
@@ -188,16 +203,17 @@ class Tracker {
   };
 
   [[nodiscard]] TrackResult initialise(const sensor::RgbdFrame& frame, const Features& features);
-  [[nodiscard]] TrackResult missed(const sensor::RgbdFrame& frame);
+  [[nodiscard]] TrackResult missed(const sensor::RgbdFrame& frame, Loss loss);
   [[nodiscard]] TrackedImage image_of(const sensor::RgbdFrame& frame, const Features& features) const;
   void sense(const sensor::RgbdFrame& frame);
+  /// A tracked frame, or why there is none.
+  using Found = tl::expected<TrackResult, Loss>;
   /// Tracks from the predicted pose; none if no pose found there can be trusted.
-  [[nodiscard]] std::optional<TrackResult> track_with_motion_model(const Scene& scene,
-                                                                   const TrackedImage& image) const;
+  [[nodiscard]] Found track_with_motion_model(const Scene& scene, const TrackedImage& image) const;
   /// Finds the pose by the image's appearance; the local map moves there.
-  [[nodiscard]] std::optional<TrackResult> relocalise(const Scene& scene, const TrackedImage& image);
+  [[nodiscard]] Found relocalise(const Scene& scene, const TrackedImage& image);
   /// The frame's result, lost if there is none.
-  TrackResult concluded(const Scene& scene, const TrackedImage& image, std::optional<TrackResult> found);
+  TrackResult concluded(const Scene& scene, const TrackedImage& image, Found found);
   void record(const sensor::RgbdFrame& frame, TrackResult& result);
 
   [[nodiscard]] PoseHypotheses pose_hypotheses(const Scene& scene, const sensor::RgbdFrame& frame,

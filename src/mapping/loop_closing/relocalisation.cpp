@@ -63,6 +63,7 @@ std::optional<int> Relocalisation::judge(const maps::Map& map, const sensor::Rgb
   bool stands = track.state == tracking::TrackState::kTracked;
   if (stands && probation_->frames < kFrames) {
     track.state = tracking::TrackState::kLost;
+    track.loss = tracking::Loss::kUnconfirmed;
     return std::nullopt;
   }
 
@@ -72,6 +73,7 @@ std::optional<int> Relocalisation::judge(const maps::Map& map, const sensor::Rgb
   track.relocalised = stands;
   found_again_ = found_again_ || stands;
   if (stands) return std::nullopt;
+  if (track.loss == tracking::Loss::kNone) track.loss = tracking::Loss::kUnconfirmed;
   track.state = tracking::TrackState::kLost;
   return lost_frames;
 }

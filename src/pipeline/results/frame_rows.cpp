@@ -37,6 +37,14 @@ double cost_ratio(const mapping::BundleReport& bundle) {
   return bundle.summary.initial_cost > 0.0 ? bundle.summary.final_cost / bundle.summary.initial_cost : 1.0;
 }
 
+/// The last but one of the columns.
+std::string reason_of(const std::string& columns) {
+  const std::size_t end = columns.rfind(',');
+  if (end == std::string::npos || end == 0) return {};
+  const std::size_t before = columns.rfind(',', end - 1);
+  return before == std::string::npos ? std::string() : columns.substr(before + 1, end - before - 1);
+}
+
 const std::array kColumns{
     Column{"stamp", [](const Report& r) { return fmt::format("{:.6f}", r.stamp); }},  // seconds
     Column{"reference", [](const Report& r) { return number(r.reference.index); }},
@@ -119,7 +127,10 @@ FrameRow row_of(std::size_t frame, const mapping::FrameReport& report, bool show
                 const std::string& robot) {
   FrameRow row{frame, state_of(report.state), robot.empty() ? "" : core::csv_field(robot) + ","};
   for (const Column& column : kColumns) row.columns += column.text(report) + ",";
-  row.columns += flag(shows_nothing);
+
+  // The tracker's reason would lead astray if the frame shows nothing.
+  if (row.state == FrameState::kLost) row.reason = shows_nothing ? kShowsNothing : to_string(report.loss);
+  row.columns += row.reason + "," + flag(shows_nothing);
   row.shows_nothing = shows_nothing;
   return row;
 }
@@ -145,6 +156,7 @@ std::optional<FrameRow> read_line(const std::string& line) {
     row.state = known;
     row.columns = line.substr(second + 1);
     row.shows_nothing = !row.columns.empty() && row.columns.back() == '1';
+    row.reason = reason_of(row.columns);
     return row;
   }
   return std::nullopt;
@@ -153,7 +165,7 @@ std::optional<FrameRow> read_line(const std::string& line) {
 std::string row_column_names() {
   std::string names;
   for (const Column& column : kColumns) names += std::string(column.name) + ",";
-  return names + "blind";
+  return names + "reason,blind";
 }
 
 core::Result<void> write_frame_rows(const std::filesystem::path& file, const std::string& columns,

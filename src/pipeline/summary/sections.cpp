@@ -30,7 +30,19 @@ Json section_of(const FrameCounts& counts) {
   }
   frames["tracked_percent"] = rounded(counts.tracked_percent());
   if (counts.bridged) frames["bridged"] = *counts.bridged;
+  if (!counts.lost_by.empty()) frames["lost_by"] = counts.lost_by;
   return frames;
+}
+
+/// " (too few features and surfaces agree: 9, a direction is free: 3)"; empty if no reason is known. Frames
+/// that show nothing are counted elsewhere.
+std::string lost_by_text(const FrameCounts& frames) {
+  std::string text;
+  for (const auto& [reason, count] : frames.lost_by) {
+    if (reason == kShowsNothing) continue;
+    text += fmt::format("{}{}: {}", text.empty() ? " (" : ", ", reason, count);
+  }
+  return text.empty() ? text : text + ")";
 }
 
 }  // namespace
@@ -40,17 +52,20 @@ FrameCounts::FrameCounts(const Json& summary) {
   for (const auto& [key, member] : kFrameCounts) this->*member = frames.at(key).get<std::size_t>();
   period_s = frames.at("period_s").get<double>();
   if (frames.contains("bridged")) bridged = frames.at("bridged").get<std::size_t>();
+  if (frames.contains("lost_by")) lost_by = frames.at("lost_by").get<std::map<std::string, std::size_t>>();
 }
 
 void FrameCounts::write(Json& summary) const { summary["frames"] = section_of(*this); }
 
 void FrameCounts::count(const std::vector<FrameRow>& rows) {
   tracked = lost = blind = longest_loss = 0;
+  lost_by.clear();
   std::size_t loss = 0;
   for (const FrameRow& row : rows) {
     const bool is_tracked = row.state == FrameState::kTracked;
     ++(is_tracked ? tracked : lost);
     blind += row.blind ? 1U : 0U;
+    if (!is_tracked && !row.reason.empty()) ++lost_by[row.reason];
     loss = is_tracked ? 0 : loss + 1;
     longest_loss = std::max(longest_loss, loss);
   }
@@ -180,12 +195,12 @@ void doubt_lost_frames(const Json& summary, std::vector<Doubt>& reasons) {
   const double percent = all > 0 ? 100.0 * static_cast<double>(without) / static_cast<double>(all) : 0.0;
   if (percent <= kMostLostPercent) return;
   const std::string none = frames.missing > 0 ? fmt::format(", {} without files", frames.missing) : "";
-  reasons.push_back(
-      {Doubt::About::kLostFrames, fmt::format("{} of {} frames have no pose ({:.1f} %; up to {:.0f} % would "
-                                              "be trusted): {} lost, {} unreadable{}; "
-                                              "the longest loss is {} frames",
-                                              without, all, percent, kMostLostPercent, frames.lost - blind,
-                                              frames.unreadable, none, frames.longest_loss)});
+  reasons.push_back({Doubt::About::kLostFrames,
+                     fmt::format("{} of {} frames have no pose ({:.1f} %; up to {:.0f} % would "
+                                 "be trusted): {} lost{}, {} unreadable{}; "
+                                 "the longest loss is {} frames",
+                                 without, all, percent, kMostLostPercent, frames.lost - blind,
+                                 lost_by_text(frames), frames.unreadable, none, frames.longest_loss)});
 }
 
 void doubt_empty_cloud(const Json& summary, std::vector<Doubt>& reasons) {

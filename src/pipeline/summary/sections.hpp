@@ -5,6 +5,7 @@
 // here.
 #include <cstddef>
 #include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -49,7 +50,8 @@ struct FrameCounts {
   std::size_t read = 0, resumed = 0, unreadable = 0, missing = 0;
   std::size_t odometry = 0;  ///< with a pose of the recorder's own
   std::size_t tracked = 0, lost = 0, blind = 0, longest_loss = 0;
-  std::optional<std::size_t> bridged;  ///< none: without sensors of the body
+  std::optional<std::size_t> bridged;          ///< none: without sensors of the body
+  std::map<std::string, std::size_t> lost_by;  ///< numbers of lost frames by reason
   double period_s = 0.0;
 
   FrameCounts() = default;

@@ -79,8 +79,9 @@ void FrameAligner::judge() {
   const bool constrained = result_.dead_reckoned
                                ? in_.motion.may_dead_reckon() && ((by_features && many) || all_surface)
                                : by_features || by_surface;
-  result_.state = constrained && result_.camera_from_world.translation.allFinite() ? TrackState::kTracked
-                                                                                   : TrackState::kLost;
+  const bool tracked = constrained && result_.camera_from_world.translation.allFinite();
+  result_.state = tracked ? TrackState::kTracked : TrackState::kLost;
+  if (!tracked) result_.loss = by_features || by_surface ? Loss::kFreeDirection : Loss::kFewAgree;
 }
 
 }  // namespace plumbline::tracking

@@ -114,6 +114,8 @@ TEST_F(Checks, FramesThatShowNothingAreNotLost) {
   const auto& coverage = summary["verdict"]["coverage"];
   EXPECT_EQ(mapped.code, 0) << mapped;
   EXPECT_GT(summary["frames"]["lost"], 9) << "a quarter of the frames is dark";
+  EXPECT_GT(summary["frames"]["lost_by"]["shows nothing"], 9) << summary["frames"];
+  EXPECT_NE(slurp(path("out/frames.csv")).find(",shows nothing,1\n"), std::string::npos);
   EXPECT_NEAR(coverage["blind_s"], 1.5, 0.3) << coverage;
   EXPECT_LT(coverage["lost_s"], 0.5) << coverage;
   EXPECT_GT(coverage["tracked"], 0.9) << coverage;

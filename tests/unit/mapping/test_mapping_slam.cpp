@@ -245,7 +245,9 @@ TEST(Slam, BlackBlindAndRepeatedFramesAreSurvived) {
   shots.insert(shots.begin() + 21, repeated);  // the same picture with the same stamp
   const SlamRun result = run(shots);
   EXPECT_EQ(result.reports[8].state, TrackState::kLost) << "nothing to be seen is nothing to be trusted";
+  EXPECT_EQ(result.reports[8].loss, tracking::Loss::kFewAgree);
   EXPECT_EQ(result.reports[9].state, TrackState::kTracked);
+  EXPECT_EQ(result.reports[9].loss, tracking::Loss::kNone);
   EXPECT_EQ(result.reports[14].state, TrackState::kTracked) << "points and lines suffice for a frame";
   EXPECT_EQ(result.reports[21].state, TrackState::kTracked);
   EXPECT_EQ(result.count(TrackState::kTracked), 28);
@@ -297,6 +299,8 @@ TEST(Slam, LostWhileCoveredAndFoundAgainAtAKnownPlace) {
     for (std::size_t i = 0; i < 30; ++i) EXPECT_EQ(result.reports[i].state, TrackState::kTracked) << i;
     const std::size_t believed = loops ? 46 : 42;  // on probation until then
     for (std::size_t i = 30; i < believed; ++i) EXPECT_EQ(result.reports[i].state, TrackState::kLost) << i;
+    for (std::size_t i = 42; i < believed; ++i)
+      EXPECT_EQ(result.reports[i].loss, tracking::Loss::kUnconfirmed) << i;
     for (std::size_t i = believed; i < 48; ++i) EXPECT_EQ(result.reports[i].state, TrackState::kTracked) << i;
     EXPECT_TRUE(result.reports[believed].relocalised)
         << "carried back while covered: only the picture can tell";

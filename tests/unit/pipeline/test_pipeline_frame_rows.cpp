@@ -12,6 +12,7 @@ TEST(FrameRows, AreReadAsTheyWereWritten) {
   report.stamp = 1305031102.175304;
   for (const auto state : {tracking::TrackState::kTracked, tracking::TrackState::kLost}) {
     report.state = state;
+    report.loss = state == tracking::TrackState::kLost ? tracking::Loss::kFewAgree : tracking::Loss::kNone;
     for (const bool shows_nothing : {true, false}) {
       for (const char* robot : {"", "one, two"}) {
         const FrameRow row = row_of(17, report, shows_nothing, robot);
@@ -20,6 +21,11 @@ TEST(FrameRows, AreReadAsTheyWereWritten) {
         EXPECT_EQ(read->frame, 17U);
         EXPECT_EQ(read->state, row.state);
         EXPECT_EQ(read->shows_nothing, shows_nothing);
+        EXPECT_EQ(read->reason, row.reason);
+        const bool lost = state == tracking::TrackState::kLost;
+        EXPECT_EQ(row.reason, !lost           ? ""
+                              : shows_nothing ? "shows nothing"
+                                              : "too few features and surfaces agree");
         EXPECT_EQ(to_line(*read), to_line(row));
       }
     }

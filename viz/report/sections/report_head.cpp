@@ -22,6 +22,17 @@ std::string banner(const char* kind, const std::string& title, const std::string
                      text.empty() ? text : paragraph(text));
 }
 
+/// "; shows nothing: 9, a direction is free: 3"
+std::string reasons_text(const nlohmann::ordered_json& summary) {
+  const nlohmann::ordered_json::json_pointer place("/frames/lost_by");
+  if (!summary.contains(place)) return {};
+
+  std::string text;
+  for (const auto& [reason, count] : summary.at(place).items())
+    text += (text.empty() ? "; " : ", ") + reason + ": " + count_text(count.get<double>());
+  return text;
+}
+
 std::string verdict_html(const ReportData& data) {
   const auto& s = data.summary;
   const double without = number_at(s, "/frames/lost") + number_at(s, "/frames/unreadable");
@@ -36,10 +47,10 @@ std::string verdict_html(const ReportData& data) {
 
   } else if (without > 0.0) {
     out += banner("warn", "Trustworthy, with gaps (exit code 0)",
-                  fmt::format("{} {} of {} frames have no pose; the longest loss is {} frames.", sentence,
+                  fmt::format("{} {} of {} frames have no pose; the longest loss is {} frames{}.", sentence,
                               count_text(without),
                               count_text(number_at(s, "/frames/read") + number_at(s, "/frames/unreadable")),
-                              count_at(s, "/frames/longest_loss")));
+                              count_at(s, "/frames/longest_loss"), reasons_text(s)));
 
   } else {
     out += banner("good", "Trustworthy (exit code 0)",
