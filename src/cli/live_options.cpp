@@ -40,7 +40,7 @@ void add_live_options(CLI::App& command, pipeline::MapRequest& request) {
           "Live camera: memory of the frames that wait to be mapped; what comes beyond is dropped and "
           "counted (default: 1GB)")
       ->type_name("SIZE")
-      ->transform(CLI::AsSizeValue(false))
+      ->transform(CLI::AsSizeValue(false).description(""))
       ->check(queue_problem);
 }
 
