@@ -58,7 +58,7 @@ void SynthOptions::declare(core::OptionTable& table) {
   table.integer("tags", tags, {0, 60}, "",
                 "AprilTags 36h11 of 16 cm on walls where the cameras pass; scene.json has their places");
   table.integer("tag_copies", tag_copies, {0, 60}, "",
-                "So many of these, the first numbers, hang a second time elsewhere");
+                "First numbers of these tags that hang a second time elsewhere");
 
   table.choice("texture", texture,
                {{"full", Texture::kFull}, {"weak", Texture::kWeak}, {"none", Texture::kNone}},

@@ -94,6 +94,44 @@ class Tags : public ProgramTest {
   std::multimap<int, Eigen::Vector3d> truth_;
 };
 
+class TagWorlds : public ProgramTest {};
+
+TEST_F(TagWorlds, TagsHangOnWallsOfScenesAndOfWorldsByNumber) {
+  const std::string small = " --frames 60 --fps 3 --width 320 --height 240 --reference-spacing 10cm -q";
+  int count = 0;
+  for (const char* world : {"room", "office", "home --layout 7"}) {
+    const std::string folder = fmt::format("w{}", count++);
+    const Outcome filmed =
+        run(fmt::format("synth {} -o {} --tags 3 --tag-copies 1 --texture weak", world, folder) + small);
+    ASSERT_EQ(filmed.code, 0) << world << filmed;
+    const auto tags = read_json(path(folder + "/scene.json"))["tags"];
+    ASSERT_EQ(tags.size(), 4U) << world;
+    EXPECT_EQ(tags[3]["tag"], 0) << "the first number is the one that hangs twice";
+
+    // Upright squares of 16 cm, apart from each other.
+    for (std::size_t i = 0; i < tags.size(); ++i) {
+      const auto place = [](const nlohmann::json& p) { return Eigen::Vector3d(p[0], p[1], p[2]); };
+      const Eigen::Vector3d middle = place(tags[i]["middle"]);
+      EXPECT_GT(middle.z(), 1.05) << world;
+      EXPECT_LT(middle.z(), 1.75) << world;
+      const auto& c = tags[i]["corners"];
+      EXPECT_NEAR((place(c[0]) - place(c[1])).norm(), 0.16, 1e-9);
+      EXPECT_NEAR(place(c[0]).z() - place(c[3]).z(), 0.16, 1e-9);
+      EXPECT_NEAR((0.5 * (place(c[0]) + place(c[2])) - middle).norm(), 0.0, 1e-9);
+      for (std::size_t j = 0; j < i; ++j) EXPECT_GT((place(tags[j]["middle"]) - middle).norm(), 0.5) << world;
+    }
+  }
+
+  // More than the cameras see free wall for; more copies than tags.
+  const Outcome many = run("synth room -o none --tags 60" + small);
+  EXPECT_EQ(many.code, 2) << many;
+  EXPECT_TRUE(many.told("the cameras come near free wall for")) << many;
+  const Outcome copies = run("synth room -o none --tags 2 --tag-copies 3" + small);
+  EXPECT_EQ(copies.code, 2) << copies;
+  EXPECT_TRUE(copies.told("tag_copies")) << copies;
+  EXPECT_FALSE(fs::exists(path("none")));
+}
+
 TEST_F(Tags, LengthsBringScaleAndACopySaysNothing) {
   ASSERT_GT(scale_off("m"), 0.03);
   const Outcome found = adjust("found", "family: 36h11\n");
