@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <complex>
+#include <string>
 
 #include "plumbline/adjust/place_views.hpp"
 #include "plumbline/geometry/adjoint.hpp"
@@ -18,8 +19,11 @@ namespace {
 
 using geometry::Rigid3;
 
-/// Places in both maps, by part.
-using Places = std::array<std::vector<Eigen::Vector3d>, 2>;
+/// Places in both maps, by part, and the maps' names.
+struct Places {
+  std::array<std::vector<Eigen::Vector3d>, 2> in;
+  std::array<std::string, 2> names;
+};
 
 constexpr double kGate_m = 0.1;        // places of a pick that are further from each other are different ones
 constexpr double kLeastSpread = 0.02;  // m^2, of two picks 20 cm apart; nearer ones leave the turn open
@@ -38,14 +42,14 @@ Laid lay(const Places& places, std::size_t without) {
   constexpr double kSquare_rad = 0.01;  // and of walls that are square
 
   // Both maps are upright, so they differ by a shift and a turn about z; the centroids determine the shift.
-  const std::size_t all = places[0].size();
+  const std::size_t all = places.in[0].size();
   const auto count = static_cast<double>(without < all ? all - 1 : all);
   Eigen::Vector3d a = Eigen::Vector3d::Zero(), b = Eigen::Vector3d::Zero();
 
   for (std::size_t i = 0; i < all; ++i) {
     if (i == without) continue;
-    a += places[0][i] / count;
-    b += places[1][i] / count;
+    a += places.in[0][i] / count;
+    b += places.in[1][i] / count;
   }
 
   // With positions as complex numbers, seen from above, the angle of this sum is the least-squares turn.
@@ -53,7 +57,7 @@ Laid lay(const Places& places, std::size_t without) {
   std::complex<double> sum(0.0, 0.0);
   for (std::size_t i = 0; i < all; ++i) {
     if (i == without) continue;
-    const Eigen::Vector3d p = places[0][i] - a, q = places[1][i] - b;
+    const Eigen::Vector3d p = places.in[0][i] - a, q = places.in[1][i] - b;
     sum += std::conj(std::complex<double>(q.x(), q.y())) * std::complex<double>(p.x(), p.y());
     laid.spread += q.head<2>().squaredNorm();
   }
@@ -69,7 +73,7 @@ Laid lay(const Places& places, std::size_t without) {
   laid.first_from_second = Rigid3(axes, a - axes * b);
 
   for (std::size_t i = 0; i < all; ++i) {
-    const double apart = (laid.first_from_second * places[1][i] - places[0][i]).norm();
+    const double apart = (laid.first_from_second * places.in[1][i] - places.in[0][i]).norm();
     if (i == without || apart <= laid.largest) continue;
     laid.largest = apart;
     laid.worst = i;
@@ -81,12 +85,13 @@ Laid lay(const Places& places, std::size_t without) {
 /// Which picks do not fit together, and by how much.
 tl::unexpected<core::Error> contradiction(const Places& places, const Laid& laid) {
   constexpr const char* kForm = "a pick is x,y,z in the first map = x,y,z of the same place in the second";
-  const std::size_t all = places[0].size();
+  const std::size_t all = places.in[0].size();
   if (all == 2) {
-    return core::usage_error(
-        fmt::format("--pick: picks 1 and 2 contradict each other: {:.2f} m from one to the other in a "
-                    "map, {:.2f} m in the other map; {}",
-                    (places[0][0] - places[0][1]).norm(), (places[1][0] - places[1][1]).norm(), kForm));
+    return core::usage_error(fmt::format(
+        "--pick: picks 1 and 2 contradict each other: {:.2f} m from one to the other in {}, {:.2f} m "
+        "in {}; {}",
+        (places.in[0][0] - places.in[0][1]).norm(), places.names[0],
+        (places.in[1][0] - places.in[1][1]).norm(), places.names[1], kForm));
   }
 
   // If all others fit together once a single one is left out, that one is wrong.
@@ -98,7 +103,7 @@ tl::unexpected<core::Error> contradiction(const Places& places, const Laid& laid
 
   if (suspects.size() == 1) {
     const Rigid3 fit = lay(places, suspects[0]).first_from_second;
-    const double off = (fit * places[1][suspects[0]] - places[0][suspects[0]]).norm();
+    const double off = (fit * places.in[1][suspects[0]] - places.in[0][suspects[0]]).norm();
     return core::usage_error(
         fmt::format("--pick: pick {} is {:.0f} cm from where the others put it, which fit together; {}",
                     suspects[0] + 1, 100.0 * off, kForm));
@@ -111,7 +116,7 @@ tl::unexpected<core::Error> contradiction(const Places& places, const Laid& laid
 
 /// Errors (kUsage): too few picks, too near each other, or of different places.
 core::Result<Rigid3> laid_by_picks(const Places& places) {
-  const std::size_t all = places[0].size();
+  const std::size_t all = places.in[0].size();
   if (all < 2) {
     return core::usage_error(
         "--pick: a single pick leaves the turn between the maps open; pick a second place at least 20 cm "
@@ -143,9 +148,10 @@ core::Result<mapping::MergeEvidence> picked_merge(const maps::StoredMaps& maps,
                                                   const std::vector<RobotMap>& parts,
                                                   const core::Executor& executor) {
   Places places;
+  for (std::size_t p = 0; p < 2; ++p) places.names[p] = maps.parts()[p].name;
   for (const maps::Pick& pick : maps.picks()) {
-    places[pick.first_part].push_back(pick.first);
-    places[1 - pick.first_part].push_back(pick.second);
+    places.in[pick.first_part].push_back(pick.first);
+    places.in[1 - pick.first_part].push_back(pick.second);
   }
 
   const auto laid = laid_by_picks(places);
@@ -159,14 +165,14 @@ core::Result<mapping::MergeEvidence> picked_merge(const maps::StoredMaps& maps,
     if (!stored[p]->result.upright)
       return core::usage_error("--pick: " + maps.parts()[p].name +
                                " is not upright; map again without fuse.up=none");
-    seen[p] = adjust::find_place_views(maps, p, places[p], executor);
+    seen[p] = adjust::find_place_views(maps, p, places.in[p], executor);
 
     for (std::size_t i = 0; i < seen[p].size(); ++i) {
       if (!seen[p][i].empty()) continue;
       return core::usage_error(fmt::format(
           "--pick: pick {}: in {} no keyframe saw a surface within 6 cm of {:.3f},{:.3f},{:.3f}; pick on a "
           "surface",
-          i + 1, maps.parts()[p].name, places[p][i].x(), places[p][i].y(), places[p][i].z()));
+          i + 1, maps.parts()[p].name, places.in[p][i].x(), places.in[p][i].y(), places.in[p][i].z()));
     }
   }
 
@@ -185,7 +191,7 @@ core::Result<mapping::MergeEvidence> picked_merge(const maps::StoredMaps& maps,
 
   // Each pick is a constraint between keyframes of both maps, good to 1 cm and 0.01 rad.
   merge.alignment.covariance = geometry::information_of(0.01, 0.01).inverse();
-  for (std::size_t i = 0; i < places[0].size(); ++i) {
+  for (std::size_t i = 0; i < places.in[0].size(); ++i) {
     mapping::VerifiedPair& pair = merge.pairs.emplace_back();
     pair.match = seen[first][i].front().first;
     pair.query = seen[1 - first][i].front().first;

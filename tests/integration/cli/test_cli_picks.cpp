@@ -41,14 +41,14 @@ objects:
   - poster: {at: [5.2, 0, 1.5], yaw: 180 deg}
   - picture: {at: [5.4, 3.3, 1.6], size: [1.0, 0.6]}
 robots:
-  - {name: west, closed: true, speed: 0.5, turn_rate: 0.7, height: 1.3, pitch: -8 deg,
-     path: [{at: [1.2, 1.2], look: [3.1, 1.6, 1.2]}, {at: [1.4, 1.8], look: [3.1, 2.2, 1.2]},
-            {at: [1.3, 2.2], look: [1.2, 3.3, 1.2]}, {at: [1.6, 1.9], look: [0, 1.8, 1.2]},
-            {at: [1.6, 1.5], look: [0.8, 0, 1.1]}, {at: [1.3, 1.2], look: [2.6, 0, 1.2]}]}
-  - {name: east, closed: true, speed: 0.5, turn_rate: 0.7, height: 1.4, pitch: -8 deg,
-     path: [{at: [5.0, 1.8], look: [3.1, 1.7, 1.2]}, {at: [4.9, 1.4], look: [3.1, 1.2, 1.2]},
-            {at: [4.6, 1.3], look: [5.0, 0, 1.1]}, {at: [4.5, 1.7], look: [6.2, 1.6, 1.2]},
-            {at: [4.6, 2.0], look: [5.6, 3.3, 1.2]}, {at: [5.0, 2.0], look: [3.6, 3.3, 1.2]}]}
+  - {name: west, closed: true, speed: 0.5, turn_rate: 0.7, height: 1.3, pitch: -6 deg,
+     path: [{at: [2.3, 1.95], look: [3.1, 1.25, 1.2]}, {at: [2.3, 1.35], look: [3.1, 2.05, 1.2]},
+            {at: [1.7, 1.5], look: [1.4, 3.3, 1.2]}, {at: [1.5, 1.7], look: [0, 1.7, 1.2]},
+            {at: [1.6, 1.9], look: [1.0, 0, 1.1]}, {at: [2.0, 2.0], look: [2.6, 0, 1.2]}]}
+  - {name: east, closed: true, speed: 0.5, turn_rate: 0.7, height: 1.4, pitch: -6 deg,
+     path: [{at: [3.9, 1.35], look: [3.1, 2.05, 1.2]}, {at: [3.9, 1.95], look: [3.1, 1.25, 1.2]},
+            {at: [4.4, 1.9], look: [4.8, 0, 1.1]}, {at: [4.7, 1.7], look: [6.2, 1.6, 1.2]},
+            {at: [4.6, 1.4], look: [5.2, 3.3, 1.2]}, {at: [4.2, 1.3], look: [3.8, 3.3, 1.2]}]}
 )";
 
 constexpr const char* kLean = " --set output.views= --set output.pcd=off --set fuse.voxel=3cm";
@@ -58,7 +58,7 @@ class Picks : public ProgramTest {
   void SetUp() override {
     write("rooms.yaml", kRooms);
     const Outcome filmed =
-        run("synth rooms.yaml -o world --robots 2 --frames 90 --fps 6 --width 320 --height 240 "
+        run("synth rooms.yaml -o world --robots 2 --frames 64 --fps 6 --width 320 --height 240 "
             "--reference-spacing 10cm -q");
     ASSERT_EQ(filmed.code, 0) << filmed;
     for (const int robot : {0, 1}) {
@@ -146,7 +146,9 @@ TEST_F(Picks, WhatIsWrongIsNamed) {
 
   const Outcome two = fuse("-o none" + pick(south_) + pick(north_, {0.0, 0.4, 0.0}));
   EXPECT_EQ(two.code, 2) << two;
-  EXPECT_TRUE(two.told("picks 1 and 2 contradict each other: 0.8")) << two;
+  EXPECT_TRUE(two.told("picks 1 and 2 contradict each other: ")) << two;
+  EXPECT_TRUE(two.told("0.8")) << two;
+  EXPECT_TRUE(two.told("1.2")) << two;
 
   // Of four the wrong one is named, though it moves the others as well.
   const Outcome four =
