@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
 #include <opencv2/imgproc.hpp>
 #include <optional>
@@ -86,24 +87,26 @@ Tag tag_of(int id, const PlaceViews& seen, const maps::StoredMap& map) {
 /// Reads one entry: {tag, at, sigma} or {tags: [a, b], length, sigma}.
 void read_entry(const core::ConfigNode& node, TagControl& told, core::ConfigProblems& problems) {
   Control control;
-  double sigma = control.sigma_m, length = 0.0, number = -1.0;
+  double sigma = control.sigma_m, length = 0.0;
+  int number = -1;
   std::vector<double> pair, world;
 
   core::OptionTable table;
   table.number("sigma", sigma, {1e-5, 10.0}, "m", "");
   table.number("length", length, {0.05, 1e4}, "m", "");
-  table.number("tag", number, {0.0, 1e6}, "", "");
+  table.integer("tag", number, {0, 1000000}, "", "");
   table.numbers("tags", pair, 0, {0.0, 1e6}, "", "");
   table.numbers("at", world, 0, {-1e8, 1e8}, "m", "");
   table.set_all(node, "", problems);
 
   control.sigma_m = sigma;
-  if (number >= 0.0 && world.size() == 3) {
+  const auto whole = [](double id) { return id == std::floor(id); };
+  if (number >= 0 && world.size() == 3) {
     control.kind = ControlKind::kPoint;
     control.world = {world[0], world[1], world[2]};
-    control.name = fmt::format("tag {:.0f}", number);
-    told.ids.emplace_back(static_cast<int>(number), -1);
-  } else if (pair.size() == 2 && length > 0.0) {
+    control.name = fmt::format("tag {}", number);
+    told.ids.emplace_back(number, -1);
+  } else if (pair.size() == 2 && length > 0.0 && whole(pair[0]) && whole(pair[1]) && pair[0] != pair[1]) {
     control.length_m = length;
     control.name = fmt::format("tags {:.0f} to {:.0f}", pair[0], pair[1]);
     told.ids.emplace_back(static_cast<int>(pair[0]), static_cast<int>(pair[1]));
@@ -127,6 +130,8 @@ core::Result<TagControl> read_tags(const std::filesystem::path& file) {
   table.set_all(*root, "", problems, {"control"});
 
   if (const core::ConfigNode* control = root->find("control")) {
+    if (control->kind == core::ConfigNode::Kind::kMap || control->kind == core::ConfigNode::Kind::kScalar)
+      problems.push_back({control->mark, "control", "write a list: lines that begin with \"- \""});
     for (const core::ConfigNode& node : control->items) read_entry(node, told, problems);
   }
 

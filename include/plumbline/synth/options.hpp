@@ -31,6 +31,8 @@ struct SynthOptions {
   int moving_doors = 0;        ///< at most so many doors of a world made from a number swing meanwhile
   int moving_drawers = 0;      ///< at most so many drawers of desks slide out and back meanwhile
   int walkers = 0;             ///< number of the scene's walkers to film; they are not in reference.ply
+  int tags = 0;                ///< AprilTags on walls that the cameras pass, numbers from 0
+  int tag_copies = 0;          ///< so many of their first numbers hang a second time elsewhere
   Texture texture = Texture::kFull;  ///< kNone: white cloth and grey floors, geometry unchanged
   Sensor sensor = Sensor::kKinect;   ///< kIdeal: no noise, no offset between stamps, no blur
   Motion motion = Motion::kScene;

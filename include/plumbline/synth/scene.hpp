@@ -136,6 +136,13 @@ struct SceneChange {
   double factor = 1.0;    ///< of all light
 };
 
+/// An AprilTag on a wall.
+struct WallTag {
+  int id = 0;
+  Eigen::Vector3d middle;
+  Eigen::Vector3d corners[4];  ///< of the black square, clockwise from the upper left one
+};
+
 struct Scene {
   std::string name;
   std::string description;
@@ -152,6 +159,7 @@ struct Scene {
   std::vector<DoorLeaf> leaves;
   std::vector<MovingDoor> moving_doors;  ///< those of the options
   std::vector<SceneChange> changes;      ///< those of the options, done
+  std::vector<WallTag> tags;             ///< those of the options; of a number that hangs twice both
   std::optional<Plan> plan;              ///< of a world made from a number
 };
 

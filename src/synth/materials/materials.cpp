@@ -41,6 +41,7 @@ constexpr std::array kMaterials = {
     Material{"screen", draw_screen, 0.10F, 0.12F, 0.16F, 0.6, 512, 0.03F, 0.6F, 0.9F, false},
     Material{"sign", draw_sign, 0.7F, 0.7F, 0.7F, 0.3, 256, 0.7F, 0.1F, 0.0F, false},
     Material{"sofa", draw_fabric, 0.34F, 0.36F, 0.30F, 0.4, 256, 0.4F, 0.0F, 0.0F, false},
+    Material{"tag", draw_tag, 0.5F, 0.5F, 0.5F, 0.2, 512, 0.7F, 0.0F, 0.0F, false, true},
     Material{"terracotta", draw_plain, 0.50F, 0.24F, 0.14F, 0.4, 128, 0.5F, 0.0F, 0.0F, false},
     Material{"tiles", draw_tiles, 0.62F, 0.60F, 0.55F, 1.2, 512, 0.6F, 0.3F, 0.0F, true},
     Material{"books", draw_books, 0.4F, 0.3F, 0.25F, 0.5, 256, 0.5F, 0.0F, 0.0F, false},

@@ -28,6 +28,7 @@ struct Material {
   float gloss;             ///< 0 matt - 1 mirror: glints blind the depth sensor, grazing rays glance off
   float glow;              ///< gives light itself
   bool large;              ///< walls, floors, ceilings: without texture they become cloth or lino
+  bool numbered = false;   ///< the seed of a face is a number that is printed, whatever the texture
 };
 
 /// Null when there is no such material.

@@ -49,4 +49,9 @@ Canvas draw_books(const Material& m, cv::Size size, std::uint64_t seed);
 Canvas draw_window(const Material& m, cv::Size size, std::uint64_t seed);
 Canvas draw_screen(const Material& m, cv::Size size, std::uint64_t seed);
 
+// ---- texture_tags.cpp ----
+
+/// The AprilTag of number `seed`, with a white border as wide as one of its cells.
+Canvas draw_tag(const Material& m, cv::Size size, std::uint64_t seed);
+
 }  // namespace plumbline::synth

@@ -42,7 +42,7 @@ int power_of_two(double pixels) {
 }  // namespace
 
 Material worn(const Material& material, Texture texture) {
-  if (texture != Texture::kNone) return material;
+  if (texture != Texture::kNone || material.numbered) return material;
   const auto is = [&](std::string_view name) { return material.name == name; };
 
   // Large surfaces lose their texture.
@@ -76,7 +76,7 @@ Texture2d draw_texture(const Material& material, Texture texture, std::uint64_t 
     canvas = m.draw(m, size, seed);
   }
 
-  if (texture == Texture::kWeak) fade(canvas, 0.2F);
+  if (texture == Texture::kWeak && !m.numbered) fade(canvas, 0.2F);
 
   // Mip levels down to one texel.
   Texture2d out;

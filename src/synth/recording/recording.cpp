@@ -16,6 +16,7 @@
 #include "recording/reference.hpp"
 #include "recording/scene_file.hpp"
 #include "recording/truth_files.hpp"
+#include "render/world.hpp"
 #include "scene/random.hpp"
 #include "scene/rig.hpp"
 
@@ -355,7 +356,7 @@ Result<WriteSummary> write_recordings(const WriteRequest& request, const core::E
 
   // Written last, with the state of the run.
   summary.stopped = stop.stop_requested();
-  const std::string json = core::json_text(describe_world(scene, options, summary, *robots));
+  const std::string json = core::json_text(describe_world((*world)->scene, options, summary, *robots));
   if (auto ok = core::write_file(output / "scene.json", json); !ok) return fail(ok.error());
 
   // A summary for the user.

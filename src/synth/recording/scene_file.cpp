@@ -79,6 +79,19 @@ nlohmann::json describe_options(const Scene& scene, const SynthOptions& options)
   return json;
 }
 
+/// Numbers, middles and corners, in the order in which they were hung.
+nlohmann::json describe_tags(const std::vector<WallTag>& tags) {
+  const auto list = [](const Eigen::Vector3d& v) { return nlohmann::json{v.x(), v.y(), v.z()}; };
+  nlohmann::json json = nlohmann::json::array();
+  for (const WallTag& tag : tags) {
+    nlohmann::json corners = nlohmann::json::array();
+    for (const Eigen::Vector3d& corner : tag.corners) corners.push_back(list(corner));
+    json.push_back({{"tag", tag.id}, {"middle", list(tag.middle)}, {"corners", corners}});
+  }
+
+  return json;
+}
+
 }  // namespace
 
 nlohmann::json describe_robot(const SynthSource& source, const std::string& folder,
@@ -130,6 +143,7 @@ nlohmann::json describe_world(const Scene& scene, const SynthOptions& options, c
                            {"samples", summary.reference_samples},
                            {"visible", summary.reference_visible}}},
                          {"complete", !summary.stopped}};
+  if (!scene.tags.empty()) json["tags"] = describe_tags(scene.tags);
   if (scene.plan) json["openings"] = {{"count", summary.openings}, {"seen", summary.openings_seen}};
   return json;
 }

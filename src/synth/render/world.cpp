@@ -13,6 +13,7 @@
 #include <tuple>
 
 #include "plumbline/synth/layout.hpp"
+#include "render/wall_tags.hpp"
 #include "scene/builder.hpp"
 #include "scene/random.hpp"
 
@@ -242,7 +243,9 @@ void World::prepare_textures() {
     if (fresh) {
       std::uint64_t name_hash = 0;
       for (const char letter : face.material) name_hash = mix(name_hash, static_cast<std::uint64_t>(letter));
-      jobs.push_back({materials[i], mix(seed, name_hash, static_cast<std::uint64_t>(variant)), aspect});
+      const auto number = static_cast<std::uint64_t>(variant);
+      jobs.push_back(
+          {materials[i], materials[i]->numbered ? number - 1 : mix(seed, name_hash, number), aspect});
     }
 
     // Tiled textures begin anywhere.
@@ -300,6 +303,8 @@ core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const
                     "for fewer, or add some to a copy of the scene",
                     scene.name, scene.walkers.size(), options.walkers));
   }
+
+  if (auto hung = hang_tags(options, peopled); !hung) return tl::unexpected<core::Error>(hung.error());
 
   // Cameras must not run into anything.
   auto world = std::make_shared<World>(std::move(peopled), options);

@@ -55,6 +55,11 @@ void SynthOptions::declare(core::OptionTable& table) {
   table.integer("walkers", walkers, {0, 20}, "",
                 "Number of people who walk about: filmed, but no part of reference.ply");
 
+  table.integer("tags", tags, {0, 60}, "",
+                "AprilTags 36h11 of 16 cm on walls where the cameras pass; scene.json has their places");
+  table.integer("tag_copies", tag_copies, {0, 60}, "",
+                "First numbers of these tags that hang a second time elsewhere");
+
   table.choice("texture", texture,
                {{"full", Texture::kFull}, {"weak", Texture::kWeak}, {"none", Texture::kNone}},
                "Strength of textures; none: white cloth and grey floors");
@@ -210,6 +215,11 @@ core::Result<void> check(const SynthOptions& options) {
     return core::usage_error("width, height: at least 64 x 48 pixels");
   if (!(options.fps > 0.0) || !(options.speed > 0.0))
     return core::usage_error("fps, speed: must be positive");
+
+  if (options.tag_copies > options.tags) {
+    return core::usage_error(fmt::format("tag_copies: {} of {} tags cannot hang twice; raise tags",
+                                         options.tag_copies, options.tags));
+  }
 
   // Texts with settings must be readable.
   if (auto events = parse_events(options.events); !events) return tl::unexpected<core::Error>(events.error());

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "plumbline/cloud/io/cloud_io.hpp"
-#include "plumbline/dataset/trajectory_io.hpp"
 #include "program.hpp"
+#include "true_frame.hpp"
 
 namespace plumbline::integration {
 namespace {
@@ -39,22 +39,8 @@ class Adjust : public ProgramTest {
     choose();
   }
 
-  /// The similarity that leads from a result's path to the true one.
   [[nodiscard]] Eigen::Matrix4d truth_of(const std::string& result) const {
-    const auto path_of_map = dataset::read_trajectory(path(result) / "trajectory.txt");
-    const auto truth = dataset::read_trajectory(path("world/robot0/groundtruth.txt"));
-    std::vector<Eigen::Vector3d> from, to;
-    for (const auto& a : *path_of_map) {
-      for (const auto& b : *truth) {
-        if (std::abs(a.stamp - b.stamp) > 1e-3) continue;
-        from.push_back(a.world_from_camera.translation);
-        to.push_back(b.world_from_camera.translation);
-        break;
-      }
-    }
-    const auto count = static_cast<Eigen::Index>(from.size());
-    return Eigen::umeyama(Eigen::Map<Eigen::Matrix3Xd>(from.front().data(), 3, count),
-                          Eigen::Map<Eigen::Matrix3Xd>(to.front().data(), 3, count));
+    return true_frame(path(result) / "trajectory.txt", path("world/robot0/groundtruth.txt"));
   }
   [[nodiscard]] double scale_off(const std::string& result) const {
     return std::abs(std::cbrt(truth_of(result).topLeftCorner<3, 3>().determinant()) - 1.0);
@@ -166,6 +152,12 @@ TEST_F(Adjust, RefusesWhatSaysNothing) {
   EXPECT_TRUE(air.told("no keyframe saw a surface")) << air;
   EXPECT_EQ(adjust("-o none --length 0,0,1 0,1,1 long").code, 2);
   EXPECT_EQ(adjust("-o none --points nowhere.csv").code, 3);
+
+  // The map keeps no whole pictures.
+  write("tags.yaml", "family: 36h11\n");
+  const Outcome blind = adjust("-o none --tags tags.yaml");
+  EXPECT_EQ(blind.code, 3) << blind;
+  EXPECT_TRUE(blind.told("map again with --set store.images=whole")) << blind;
   EXPECT_EQ(run("adjust world -o none --datum 48,11,0").code, 3);
 }
 
