@@ -99,6 +99,7 @@ std::string to_json(const CheckReport& report) {
   Json along = Json::array();
   for (const BadPlace& place : report.along) along.push_back(json_of(place));
 
+  // Lengths are in metres, rounded to a micrometre: further digits are noise.
   const Json all = {{"sentence", sentence(report)},
                     {"expected_m", rounded_m(report.expected_m)},
                     {"p95_m", rounded_m(report.p95_m)},

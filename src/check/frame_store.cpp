@@ -62,6 +62,7 @@ SmallFrame shrink(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera)
   small.depth_stamp = frame.depth_stamp;
   cv::resize(frame.gray, small.gray, size, 0.0, 0.0, cv::INTER_AREA);
 
+  // Depth is sampled, not averaged: the mean across an edge would be a surface that does not exist.
   small.depth.create(size, CV_16UC1);
   std::vector<int> columns;
   columns.reserve(static_cast<std::size_t>(size.width));

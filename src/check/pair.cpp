@@ -37,6 +37,8 @@ std::vector<Equation> equations(const PairRows& rows, const sensor::Pinhole& cam
   std::vector<Equation> all;
   all.reserve(rows.depth.size() + 2 * rows.flow.size());
   if (use != Rows::kFlow) {
+    // Both frames are noisy, which doubles the variance. Neighbouring rows share their noise, so that many
+    // rows count only as much as kIndependent.
     const double alike =
         std::sqrt(2.0 * std::max(1.0, static_cast<double>(rows.depth.size()) / kIndependent));
 
@@ -52,6 +54,8 @@ std::vector<Equation> equations(const PairRows& rows, const sensor::Pinhole& cam
   if (use != Rows::kDepth) {
     for (const FlowRow& f : rows.flow) {
       const Eigen::Vector3d& p = f.point;
+
+      // Derivatives of the two pixel coordinates by the point: each of them gives one equation.
       const std::array<Eigen::Vector3d, 2> slopes{
           Eigen::Vector3d(camera.fx / p.z(), 0.0, -camera.fx * p.x() / (p.z() * p.z())),
           Eigen::Vector3d(0.0, camera.fy / p.z(), -camera.fy * p.y() / (p.z() * p.z()))};
@@ -163,6 +167,7 @@ Correction correction_of(const PairRows& rows, const sensor::Pinhole& second, co
     Matrix6d information = Matrix6d::Zero();
     Vector6d right = Vector6d::Zero();
 
+    // Huber weights bound the effect of outliers; in the last rounds rows that are very far off are left out.
     for (const Equation& e : all) {
       const double off = std::abs(e.value - e.row.dot(found.motion));
       if (round >= kFirstRounds && off > kFarthest) continue;  // at first a jump takes all rows far away
@@ -171,6 +176,8 @@ Correction correction_of(const PairRows& rows, const sensor::Pinhole& second, co
       right.noalias() += weight * e.value * e.row;
     }
 
+    // The reported information is that of the rows alone; the prior only keeps
+    // unconstrained directions finite.
     found.information = information;
     found.motion = (information + weak).ldlt().solve(right);
   }

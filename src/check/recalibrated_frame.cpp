@@ -24,11 +24,14 @@ RecalibratedFrame::RecalibratedFrame(const sensor::Pinhole& image, const sensor:
 
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
+      // Grey values are interpolated between the old picture's pixels, each of
+      // which is a mean around its middle.
       const Eigen::Vector2d middle((x + 0.5) * step_x - 0.5, (y + 0.5) * step_y - 0.5);
       const Eigen::Vector2d gray = back.pixel(middle);
       gray_from_.at<cv::Vec2f>(y, x) = {static_cast<float>((gray.x() + 0.5) / step_x - 0.5),
                                         static_cast<float>((gray.y() + 0.5) / step_y - 0.5)};
 
+      // Depth is taken from a single pixel, because interpolation would invent surfaces at edges.
       const Eigen::Vector2d now(grid_pixel(x, image.width, size.width),
                                 grid_pixel(y, image.height, size.height));
       const Eigen::Vector2d was = own_depth ? now : back.pixel(now);
@@ -37,6 +40,7 @@ RecalibratedFrame::RecalibratedFrame(const sensor::Pinhole& image, const sensor:
       const bool inside = u >= 0 && v >= 0 && u < size.width && v < size.height;
       depth_from_.at<cv::Vec2s>(y, x) = {static_cast<short>(inside ? u : -1), static_cast<short>(v)};
 
+      // The correction adds a constant to the inverse depth: its value at one metre holds at all depths.
       const double one = forth.depth(was, now, 1.0);
       slope_.at<float>(y, x) = one > 0.0 ? static_cast<float>(1.0 / one - 1.0) : 0.0F;
     }

@@ -210,6 +210,7 @@ class Check {
     for (const Outline& outline : outlines_) distances.push_back(outline.distance_m);
     if (!distances.empty()) report.distance_m = core::median(std::move(distances));
 
+    // Pairs that contradict the path have no shift to report; the graph counts them as refused.
     for (std::size_t gap = 0; gap < kGaps; ++gap) {
       std::vector<double> shifts, unexplained;
       for (const AlignedPair& pair : pairs_[gap]) {
@@ -217,11 +218,14 @@ class Check {
         shifts.push_back(pair.both.shift_m());
         unexplained.push_back(pair.both.unexplained_m());
       }
+
       report.align[gap] = {pairs_[gap].size(), core::quantile(shifts, 0.5, 0.0),
                            core::quantile(shifts, 0.9, 0.0), core::quantile(unexplained, 0.5, 0.0)};
       report.pairs += pairs_[gap].size();
     }
 
+    // The size of the scene is the extent of the cameras, extended by the
+    // distance of the surfaces on either side.
     Eigen::AlignedBox3d box;
     for (const std::size_t a : anchors_) box.extend(frames_[a].poses.world_from_depth.translation);
     if (!anchors_.empty()) report.size_m = box.diagonal().norm() + 2.0 * report.distance_m;
@@ -238,6 +242,8 @@ class Check {
     report.untied_m = untied_length(input_.ways, ties());
     const CameraPart camera = camera_part(input_, anchors);
     report.camera_m = camera.rms_m;
+
+    // The verdict needs all other figures, and the possible errors need the verdict.
     judge(report);
     report.samples = possible_errors(report, anchors, graph, camera);
     return report;
@@ -266,8 +272,10 @@ class Check {
   }
 
   GraphReport set_graph(const std::vector<GraphAnchor>& anchors, CheckReport& report) const {
+    // A pair that contradicts the path has no usable motion: it is not in the graph, but counts as refused.
     std::vector<PairLink> links;
     std::size_t refused = 0;
+
     for (const auto& pairs : pairs_) {
       for (const AlignedPair& pair : pairs) {
         if (pair.contradicts)
@@ -286,6 +294,8 @@ class Check {
     for (const auto& pairs : pairs_) {
       for (const AlignedPair& pair : pairs) note_along(pair, report);
     }
+
+    // Links that the graph has given little weight contradict the others and count as refused, too.
     for (const double weight : graph.weight) refused += weight < kRefused ? 1U : 0U;
     if (report.pairs > 0) report.refused = static_cast<double>(refused) / static_cast<double>(report.pairs);
     return graph;

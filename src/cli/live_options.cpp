@@ -1,10 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Live cameras as the input of a command.
+#include <cstdint>
+#include <string>
+
 #include "app.hpp"
 #include "plumbline/net/ros2.hpp"
 #include "terminal/signals.hpp"
 
 namespace plumbline::cli {
+namespace {
+
+/// Bytes as text; a message if a queue of that size could not hold a few pairs of large images.
+std::string queue_problem(const std::string& bytes) {
+  constexpr std::uint64_t kLeastBytes = std::uint64_t{64} << 20U;
+  return std::stoull(bytes) < kLeastBytes ? "give 64MB or more; a pair of images has up to 20MB" : "";
+}
+
+}  // namespace
 
 /// Options of live cameras.
 void add_live_options(CLI::App& command, pipeline::MapRequest& request) {
@@ -22,6 +34,14 @@ void add_live_options(CLI::App& command, pipeline::MapRequest& request) {
                   "Live camera: also write the mapped frames to this MCAP file, which gives the same bytes "
                   "when mapped")
       ->type_name("FILE.mcap");
+  command
+      .add_option(
+          "--max-memory", live.most_waiting_bytes,
+          "Live camera: memory of the frames that wait to be mapped; what comes beyond is dropped and "
+          "counted (default: 1GB)")
+      ->type_name("SIZE")
+      ->transform(CLI::AsSizeValue(false))
+      ->check(queue_problem);
 }
 
 void add_publish_option(CLI::App& command, std::string& address) {

@@ -81,11 +81,14 @@ class RunViews {
                         0.0});
     }
 
+    // Features are corrected for lens and rolling shutter, with the camera that is in question here. The
+    // calibration needs the measurements in the raw image.
     static const ObservationNoise noise;
     for (const core::PointId id : run_.map->point_ids()) {
       for (const maps::Observation& o : run_.map->point(id).observations) {
         const auto view = index.find(o.keyframe);
         if (view == index.end()) continue;
+
         const features::FrameFeatures& picture = *run_.map->keyframe(o.keyframe).features;
         const features::PointFeature& f = picture.points[static_cast<std::size_t>(o.feature)];
         const auto measured = features::measurement_of({f.pixel.cast<double>(), static_cast<double>(f.depth)},
@@ -97,6 +100,7 @@ class RunViews {
   }
 
   void add_frames(std::size_t most) {
+    // Keyframes are views already; frames between them can be used only if their observations were kept.
     std::vector<const maps::FramePose*> frames;
     for (const maps::FramePose& frame : *run_.frames) {
       if (frame.seen != nullptr && maps::is_between_keyframes(frame, *run_.map)) frames.push_back(&frame);
@@ -109,6 +113,9 @@ class RunViews {
                 maps::root_of(*run_.map, frame.reference),
                 {},
                 0.0};
+
+      // Depths are corrected for the delay that was assumed when the frame was
+      // read; only its change is missing.
       view.late_s = model_.camera().depth_delay_s - frame.seen->depth_delay_s;
 
       for (const maps::SeenPoint& s : frame.seen->points) {
@@ -212,11 +219,18 @@ std::vector<CameraNumber> numbers_of(const sensor::Camera& camera) {
 optimize::CameraPrior prior_of(const sensor::Camera& given, const CalibrationOptions& options) {
   optimize::CameraPrior prior;
   const sensor::Camera& file = options.file ? *options.file : given;
+
+  // The unknowns are changes of the camera that the maps were made with, but the prior is about the camera's
+  // file: its mean is the difference of the two.
   prior.mean = optimize::change_between(given, file);
+
+  // A standard deviation given in the file replaces the default, but is never
+  // larger than that of a wrong file.
   const auto set = [&prior](CameraUnknown unknown, const NumberPrior& sigma, double told) {
     prior.right_sigma[unknown] = told > 0.0 ? std::min(told, sigma.wrong) : sigma.right;
     prior.wrong_sigma[unknown] = sigma.wrong;
   };
+
   set(optimize::kFocal, options.focal, file.sigma.fx / file.color.fx);
   set(optimize::kReadout, options.readout_s, file.sigma.readout_s);
   set(optimize::kSlopeX, options.slope, file.sigma.depth_slope);
@@ -226,6 +240,7 @@ optimize::CameraPrior prior_of(const sensor::Camera& given, const CalibrationOpt
   set(optimize::kK1, options.distortion, file.sigma.distortion);
   set(optimize::kK2, options.distortion, file.sigma.distortion);
   set(optimize::kDelay, options.delay_s, file.sigma.depth_delay_s);
+
   prior.wrong.fill(options.wrong);
   return prior;
 }
@@ -264,6 +279,7 @@ core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRu
   std::size_t keyframes = 0;
   for (const CalibrationRun& run : runs) keyframes += run.map->keyframe_count();
 
+  // Every run gets the same number of views, so that a long one does not outweigh the others.
   for (const CalibrationRun& run : runs)
     add_run(run, options.views / static_cast<int>(runs.size()), given, parts);
   CameraCalibration result;
@@ -295,6 +311,7 @@ core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRu
     }
     result.gain = 1.0 - after / before;
 
+    // A change far below the standard deviation of a wrong file needs no new linearisation.
     const CameraChange step =
         (known.mean - std::exchange(change, known.mean)).cwiseQuotient(prior.wrong_sigma);
     if (step.cwiseAbs().maxCoeff() < kSame) break;

@@ -96,6 +96,8 @@ class SecondPassRun {
   /// Frames that were not tracked again keep the tracker's steps; what these miss between two frames that
   /// were is spread over them.
   void place_frames_between() {
+    // A gap between two tracked frames is bridged from both ends; after the last one
+    // only that frame's pose is known.
     std::size_t last = frames_.size();  // the last frame with a new pose
     for (std::size_t i = 0; i < frames_.size(); ++i) {
       if (!placed_[i]) continue;
@@ -104,11 +106,13 @@ class SecondPassRun {
     }
     if (last < frames_.size()) bridge(last, frames_.size());
 
+    // Frames that the first pass had lost, or that precede the first tracked one, stay without a pose.
     for (std::size_t i = 0; i < frames_.size(); ++i) {
       if (!placed_[i]) {
         frames_[i].tracked = false;
         continue;
       }
+
       frames_[i].tracked = true;
       frames_[i].reference = placed_[i]->reference;
       frames_[i].camera_from_reference = placed_[i]->camera_from_reference;

@@ -191,6 +191,8 @@ void Slam::recalibrate(const sensor::Camera& camera, const PictureReader& read) 
   set_camera(camera);
   if (map_.keyframe_count() == 0) return;
   const sensor::Recalibration change(image_, before, camera_);
+
+  // Background work that began with the old camera must be in the map before the map is converted.
   finish();
 
   std::vector<maps::FramePose> frames = frames_.poses();
@@ -200,11 +202,13 @@ void Slam::recalibrate(const sensor::Camera& camera, const PictureReader& read) 
                                options_.mapper.edge_photometric};
   if (read) measure_surfaces_again(image_, frames, read, how, executor_, map_);
 
+  // The map is adjusted before the frames between keyframes, whose poses follow from its landmarks.
   GlobalAdjustmentOptions adjustment;
   adjustment.noise.orb_scale_factor = options_.tracker.association.scale_factor;
   adjust_recalibrated_map(image_, options_.mapper.fusion, adjustment, map_);
   solve_frames_again(change.after(), map_, frames_.poses(), path_before, executor_, frames);
 
+  // All else that holds measurements of the old camera is converted or dropped.
   frames_ = FrameTrajectory(std::move(frames));
   mapper_.recalibrate(change);
   connector_.loops().clear_pending();

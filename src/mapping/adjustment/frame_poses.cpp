@@ -23,6 +23,9 @@ std::vector<optimize::PointTerm> terms_of(const maps::SeenPoints& seen, const ma
                                           const sensor::ImageModel& model, const Rigid3& camera_from_world,
                                           const geometry::Vector6d& velocity) {
   static const ObservationNoise noise;
+
+  // The stored pixels are raw, so the rolling shutter is corrected in full. Depths are already corrected for
+  // the delay that was assumed then, so only its change counts.
   const geometry::Vector6d shutter = model.camera().readout_s.value_or(0.0) * velocity;
   const double late_s = model.camera().depth_delay_s - seen.depth_delay_s;
 
@@ -39,6 +42,7 @@ std::vector<optimize::PointTerm> terms_of(const maps::SeenPoints& seen, const ma
     term.pixel = feature.pixel;
     term.pixel_sigma = static_cast<double>(s.sigma_px);
 
+    // The depth image was taken at another time, when the camera's motion had changed the depth of the point.
     if (feature.depth > 0.0) {
       const double rate = features::depth_rate(camera_from_world * point->position,
                                                camera_from_world.rotation * point->normal, velocity);
@@ -149,6 +153,7 @@ FrameChain chain_of(const std::vector<maps::FramePose>& frames, const maps::Map&
 void solve_frames_again(const sensor::ImageModel& model, const maps::Map& map,
                         const std::vector<maps::FramePose>& before, const geometry::Trajectory& path_before,
                         const core::Executor& executor, std::vector<maps::FramePose>& frames) {
+  // Each frame is first solved alone, against the landmarks, as a measurement relative to its keyframe.
   std::vector<optimize::GraphEdge> beliefs(frames.size());
   executor.parallel_for(frames.size(), [&](std::size_t i) {
     if (!maps::is_between_keyframes(frames[i], map)) return;
@@ -156,6 +161,8 @@ void solve_frames_again(const sensor::ImageModel& model, const maps::Map& map,
                            geometry::velocity_at(path_before, frames[i].stamp));
   });
 
+  // The tracker's steps then connect neighbouring frames, so that the path stays
+  // smooth where landmarks are few.
   FrameChain chain = chain_of(frames, map, beliefs);
   if (!optimize::solve_pose_graph(chain.graph, false).usable) return;
 

@@ -302,9 +302,14 @@ GlobalAdjustmentSummary adjust_map(maps::Map& map, const Cameras& cameras, const
   if (!anchor.valid()) anchor = ids.front();
   std::vector<Rigid3> before;
   for (const KeyframeId id : ids) before.push_back(map.camera_from_world(id));
+
+  // The pose graph comes first: it removes drift, from which bundle adjustment alone would not
+  // recover, and rejects wrong edges.
   if (options.pose_graph && !extra.empty()) run_pose_graph(map, extra, options, anchor, summary);
   if (options.bundle) run_bundle(map, cameras, extra, options, anchor, summary);
 
+  // Shifts are measured between camera centres, because the translation of camera_from_world
+  // also changes with the rotation.
   for (std::size_t i = 0; i < ids.size(); ++i) {
     const double shift =
         (before[i].inverse().translation - map.camera_from_world(ids[i]).inverse().translation).norm();
@@ -323,6 +328,9 @@ MapAccuracy keyframe_accuracy(const maps::Map& map, const Cameras& cameras,
 
   int unused = 0;
   MapBundle bundle = bundle_of(map, cameras, extra, options, anchor.valid() ? anchor : ids.front(), unused);
+
+  // Residuals of neighbouring observations are correlated: taken as independent they would make
+  // the covariances far too small.
   widen(options.sigma_factors, bundle.problem);
   const optimize::PoseCovariances covariances =
       optimize::pose_covariances(bundle.problem, options.bundle_options);
@@ -331,6 +339,7 @@ MapAccuracy keyframe_accuracy(const maps::Map& map, const Cameras& cameras,
   MapAccuracy result;
   std::vector<KeyframeAccuracy>& keyframes = result.keyframes;
   keyframes.resize(ids.size());
+
   for (std::size_t i = 0; i < ids.size(); ++i) {
     keyframes[i].keyframe = ids[i];
     keyframes[i].covariance = covariances.of_pose[i];
@@ -340,6 +349,7 @@ MapAccuracy keyframe_accuracy(const maps::Map& map, const Cameras& cameras,
             extra.begin(), extra.end(), [&](const PoseEdge& e) { return e.a == ids[i] || e.b == ids[i]; })));
   }
 
+  // The numbers of observations show on which evidence an accuracy rests.
   for (const auto& o : bundle.problem.point_observations)
     ++keyframes[static_cast<std::size_t>(o.pose)].points;
   for (const auto& o : bundle.problem.line_observations) ++keyframes[static_cast<std::size_t>(o.pose)].lines;

@@ -133,6 +133,8 @@ class Builder {
   }
 
   void hold_others(const std::vector<core::PointId>& points, const std::vector<core::LineId>& lines) {
+    // Fixed keyframes keep the window in place relative to the rest of the map. They are ranked by how
+    // much they share with the window.
     std::map<KeyframeId, int> count;
     const auto vote = [&](const std::vector<maps::Observation>& observations) {
       for (const maps::Observation& o : observations) {
@@ -149,6 +151,7 @@ class Builder {
       }
     }
 
+    // The strongest ones suffice, and their number bounds the time that the bundle takes.
     std::vector<std::pair<KeyframeId, int>> others(count.begin(), count.end());
     std::stable_sort(others.begin(), others.end(),
                      [](const auto& a, const auto& b) { return a.second > b.second; });

@@ -19,6 +19,8 @@ void put_back_landmarks(const MapBundle& bundle, maps::Map& map) {
 }
 
 void drop_outliers(const MapBundle& bundle, maps::Map& map) {
+  // The map may have changed while the bundle ran: an observation is removed only if the
+  // feature still sees the same landmark.
   const auto drop = [&](auto id, auto seen_now, core::KeyframeId keyframe) {
     if (seen_now != id) return;
     map.unobserve(id, keyframe);

@@ -199,18 +199,23 @@ std::vector<PoseEdge> map_edges(const maps::Map& map, int min_shared, int max_ne
   EdgeCollector edges(map);
   KeyframeId last;
   for (const KeyframeId id : map.keyframe_ids()) {
+    // The first keyframe of a component was not tracked from the one before it, so
+    // their relative pose is unknown.
     const bool begins_component = !map.parent(id).valid();
     if (last.valid() && last.robot == id.robot && !begins_component) {
       edges.add(last, id, geometry::information_of(kNextSigma_m, kNextSigma_rad));
     }
 
     last = id;
+
+    // Edges to the strongest covisible neighbours preserve the shape that earlier adjustments gave the map.
     int neighbours = 0;
     for (const auto& [other, shared] : map.covisible(id, min_shared)) {
       if (shared < min_shared || ++neighbours > max_neighbours) break;
       edges.add(id, other, information_of_shared(shared));
     }
 
+    // Aligned surfaces relate keyframes that share too few landmarks, such as in rooms without texture.
     for (const maps::SurfaceEdge& edge : map.edges_of(id)) {
       if (edge.b == id) edges.add(edge.a, id, geometry::information_of(kNextSigma_m, kNextSigma_rad));
     }
@@ -260,11 +265,16 @@ MapGraphResult solve_map_graph(const maps::Map& map, const std::vector<PoseEdge>
 
   if (!anchor.valid()) anchor = ids.front();
   GraphBuilder graph(map, anchor);
+
+  // Edges that no drift explains are left out beforehand: they would tear the graph before the others
+  // could show that they are wrong.
   const Gating gating = gate_edges(map, ids, extra, robust);
   for (std::size_t i = 0; i < extra.size(); ++i) {
     if (!gating.refused[i]) graph.add(extra[i], extra[i].information);
   }
 
+  // The map's own edges are loosened until they allow for the measured drift; rigid ones
+  // would prevent loops from closing.
   for (const PoseEdge& e : map_edges(map)) graph.add(e, e.information / gating.drift_factor);
   result.summary = optimize::solve_pose_graph(graph.graph(), robust);
   add_verdicts(gating, result.summary);

@@ -62,6 +62,8 @@ Rigid3 aligned(const std::vector<SharedPlace>& places, const sensor::Pinhole& im
       const Eigen::Vector3d y = b_from_a * place.in_a;
       if (y.z() < kNearest_m) continue;
 
+      // Each place gives three residuals, in standard deviations: its distance along the surface's normal
+      // and its two pixel coordinates.
       Eigen::Matrix<double, 3, 6> moves;
       moves << Eigen::Matrix3d::Identity(), -geometry::skew(y);
       Eigen::Matrix3d by_place;
@@ -174,6 +176,7 @@ class MapRecalibration {
     const maps::FramePose* previous = nullptr;
     Rigid3 previous_before;
     for (maps::FramePose& frame : frames_) {
+      // A lost frame interrupts the chain of steps.
       if (!frame.tracked || !map_.has_keyframe(frame.reference)) {
         previous = nullptr;
         continue;
@@ -181,6 +184,9 @@ class MapRecalibration {
 
       const ImageChange image = image_of(frame);
       const Rigid3 before = frame.camera_from_reference;
+
+      // Frames between keyframes store no surface: that of the previous frame's keyframe is
+      // used, moved to the previous frame.
       if (frame.camera_from_previous && previous != nullptr) {
         const std::vector<maps::SurfaceSample> seen =
             tracking::transformed(samples_.at(previous->reference), previous_before);

@@ -48,6 +48,7 @@ optimize::BundleLineObservation ObservationNoise::of(const features::LineFeature
   seen.pixel_sigma = line_sigma_px * motion_factor;
   if (!line.line3 || !depth_rows) return seen;
 
+  // The lower limit bounds the weight of lines near the camera, where the depth noise alone is very small.
   const auto sigma = [&](const Eigen::Vector3d& end, const features::EndpointNoise& noise) {
     return depth_factor * motion_factor * std::max(kLeast_m, features::endpoint_sigma(end, noise));
   };

@@ -11,6 +11,7 @@ std::vector<PoseEdge> align_local_maps(const maps::Map& map,
                                        const std::map<core::KeyframeId, CoarseSurface>& surfaces,
                                        const RefinementOptions& options, const core::Executor& executor,
                                        core::Log& log, RefinementSummary& counts) {
+  // Pairs are chosen by where they lie, not by when they were made, so that revisits are aligned, too.
   const auto local_maps = make_local_maps(map, surfaces, options.local_maps, executor);
   const auto pairs = overlapping_pairs(map, local_maps, options.pairs, executor);
   const auto alignments = align_pairs(map, local_maps, pairs, options.alignment, executor);
@@ -19,6 +20,7 @@ std::vector<PoseEdge> align_local_maps(const maps::Map& map,
   counts.tried = pairs.size();
   counts.accepted = edges.size();
 
+  // Only accepted alignments count for the mean residual; the log has the reasons against the others.
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const SurfaceAlignment& a = alignments[i];
     if (a.refused.empty()) counts.mean_rms += a.rms / static_cast<double>(edges.size());
@@ -70,16 +72,21 @@ Refinement refine_map(maps::Map& map, const std::map<core::KeyframeId, CoarseSur
   Refinement result;
   std::vector<PoseEdge> edges;
   if (options.icp) edges = align_local_maps(map, surfaces, options, executor, log, result.summary);
+
+  // Loops that were closed while mapping stay in the adjustment, so that it cannot undo them. They follow the
+  // alignments, which count() expects first.
   const std::vector<PoseEdge> loops = loop_edges(map);
   edges.insert(edges.end(), loops.begin(), loops.end());
   const GlobalAdjustmentSummary adjusted = adjust_map(map, cameras, edges, options.adjustment);
   count(adjusted, result.summary);
   tell(adjusted, edges.size(), log);
+
   if (!options.accuracy) {
     result.accuracy.missing = "refine.accuracy is off";
     return result;
   }
 
+  // Edges that the pose graph rejected must not make the map look more accurate than it is.
   result.accuracy =
       keyframe_accuracy(map, cameras, believed_edges(edges, adjusted.extra), options.adjustment);
   if (!result.accuracy.missing.empty())

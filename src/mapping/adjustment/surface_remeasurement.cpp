@@ -40,9 +40,12 @@ class SurfaceReader {
           ids.begin() + static_cast<std::ptrdiff_t>(begin),
           ids.begin() + static_cast<std::ptrdiff_t>(std::min(ids.size(), begin + kAtOnce)));
 
+      // The pictures of one batch are read in parallel; its size bounds the memory that they take.
       std::vector<Picture> pictures(some.size());
       executor_.parallel_for(some.size(), [&](std::size_t i) { pictures[i] = picture_of(some[i]); });
 
+      // Surfaces are replaced before edges are aligned, because an edge uses the
+      // surface of its earlier keyframe.
       for (std::size_t i = 0; i < some.size(); ++i) {
         if (pictures[i].surface.empty()) continue;
         auto keyframe = std::make_shared<maps::Keyframe>(map_.keyframe(some[i]));
@@ -50,6 +53,7 @@ class SurfaceReader {
         map_.replace_keyframe(std::move(keyframe));
         samples_[some[i]] = std::move(pictures[i].samples);
       }
+
       align(some, pictures);
     }
   }
@@ -89,6 +93,9 @@ class SurfaceReader {
       const Picture* picture = nullptr;
       std::optional<maps::SurfaceEdge> found;
     };
+
+    // An edge is measured at its later keyframe, whose images are in memory; the
+    // earlier one has left its samples.
     std::vector<Task> tasks;
     for (std::size_t i = 0; i < some.size(); ++i) {
       if (pictures[i].depth.empty()) continue;
@@ -106,6 +113,8 @@ class SurfaceReader {
                              {of_a == samples_.end() ? nullptr : of_a->second.get(), of_b.photometric.get()});
     });
 
+    // The map is changed only after the parallel part, which reads it. Edges that
+    // cannot be aligned stay as they were.
     for (const Task& task : tasks) {
       if (task.found) map_.replace_edge(task.number, *task.found);
     }

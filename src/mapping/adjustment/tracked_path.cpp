@@ -32,11 +32,14 @@ std::optional<Contradiction> contradiction(const maps::Map& map, const KeyframeP
     if (!reference.valid() || !map.has_keyframe(reference)) continue;
     if (moved.count(id) == 0 && moved.count(reference) == 0) continue;
 
+    // The new relative pose is compared with the tracker's measurement; a difference within
+    // its noise contradicts nothing.
     const Rigid3 expected = keyframe.camera_from_reference.inverse();
     const Rigid3 off = pose_of(id) * pose_of(reference).inverse() * expected;
     const Contradiction seen{reference, id, off.translation.norm(), geometry::rotation_angle(off.rotation)};
     if (!maps::beyond_noise(seen.off_m, seen.off_rad, keyframe.reference_sigma_m)) continue;
 
+    // A difference that the map has already, and that the new poses do not enlarge, does not refute them.
     const Rigid3 now = map.camera_from_world(id) * map.camera_from_world(reference).inverse() * expected;
     if (seen.off_m <= now.translation.norm() && seen.off_rad <= geometry::rotation_angle(now.rotation))
       continue;

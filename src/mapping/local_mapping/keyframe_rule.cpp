@@ -158,11 +158,15 @@ ConeTerms KeyframeRule::cone_terms(const maps::Map& map, const tracking::TrackRe
   }
 
   const int common = landmarks_in_common(map, track.reference, track);
+
+  // The first frame after a keyframe is the standard of comparison until the next keyframe.
   if (first_.keyframe != track.reference)
     first_ = {track.reference, common, track.points.size(), track.lines.size(), terms.now};
   terms.shared = first_.landmarks > 0 ? static_cast<double>(common) / first_.landmarks : 1.0;
   terms.threshold = cone_threshold(terms.now, first_.counts, options_.cone_epsilon, options_.cone_scaled);
 
+  // With scaled thresholds at least about half of the points count, so that the balance is known even if
+  // all angles have changed little.
   double least_change = options_.cone_min_change_rad;
   if (options_.cone_scaled && !changes.empty()) least_change = std::min(least_change, core::median(changes));
   GridCounts grid{};
@@ -191,6 +195,8 @@ KeyframeDecision KeyframeRule::decide(const maps::Map& map, const tracking::Trac
   const int tracked = static_cast<int>(track.points.size() + track.lines.size());
   if (frames_since_ == 1) features_after_keyframe_ = tracked;
 
+  // Parallax is movement over depth. The depth counts as 0.3 m at least, because close to a wall every small
+  // movement would make a keyframe.
   const geometry::Rigid3 camera_from_keyframe =
       track.camera_from_world * map.camera_from_world(track.reference).inverse();
   const ViewOverlap view = overlap_of(reference, camera_from_keyframe, camera_);
@@ -200,6 +206,8 @@ KeyframeDecision KeyframeRule::decide(const maps::Map& map, const tracking::Trac
   d.rotation_rad = geometry::rotation_angle(camera_from_keyframe.rotation);
   d.urgent = is_urgent(d, tracked);
 
+  // Depth has returned after a keyframe without any: until the next keyframe
+  // there is no surface to align with.
   if (reference.surface.empty() && points_with_depth(*track.features) >= kDepthIsBack) d.urgent = true;
   d.mapper_idle = mapper_idle;
   d.cone = cone_terms(map, track, mapper_idle);
@@ -207,6 +215,8 @@ KeyframeDecision KeyframeRule::decide(const maps::Map& map, const tracking::Trac
   const bool by_cones = knows_cones();
   const bool wants = by_cones ? d.cone.candidate && d.cone.fires : plain_wants(d);
   d.wanted = d.frames_since >= options_.min_frames && (d.urgent || wants);
+
+  // An older keyframe may serve as reference again, except if tracking gets thin and needs new landmarks.
   if (d.wanted && !d.urgent) d.reuse = reusable_keyframe(map, track);
   if (d.reuse.valid()) d.wanted = false;
   if (d.wanted)
@@ -228,8 +238,11 @@ core::KeyframeId KeyframeRule::reusable_keyframe(const maps::Map& map,
   core::KeyframeId best;
   int most = 0;
 
+  // The best keyframe saw most of the matched landmarks and lies well within the plain rule's limits: at
+  // their border the next frame would ask for a keyframe again.
   for (const auto& [id, landmarks] : common) {
     if (id == track.reference || landmarks <= most || landmarks < options_.min_shared * tracked) continue;
+
     const geometry::Rigid3 camera_from_keyframe =
         track.camera_from_world * map.camera_from_world(id).inverse();
     const ViewOverlap view = overlap_of(map.keyframe(id), camera_from_keyframe, camera_);

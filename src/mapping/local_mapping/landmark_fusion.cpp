@@ -90,7 +90,9 @@ void fuse_into(maps::Map& map, const std::vector<PointId>& points, KeyframeId ke
       continue;
     }
 
+    // A free feature becomes an observation; a feature of another landmark shows that the two may be one.
     const PointId other = map.point_of(keyframe, m.feature);
+
     if (!other.valid()) {
       map.observe(m.point, keyframe, m.feature);
       map.refresh_point(m.point);

@@ -120,7 +120,10 @@ void fuse_into(maps::Map& map, const std::vector<LineId>& lines, KeyframeId keyf
       continue;
     }
 
+    // Two edges may coincide in one image by chance, so lines merge only if each
+    // fits all keyframes of the other.
     const LineId other = map.line_of(keyframe, m.feature);
+
     if (!other.valid()) {
       map.observe(m.line, keyframe, m.feature);
       ++summary.observed;

@@ -174,6 +174,9 @@ std::optional<Meeting> meet(const maps::Map& map, const PairSearch& search, cons
 
   const features::CornerPatch& patch = image->newest.patches[static_cast<std::size_t>(newest.feature)];
   if (patch.empty()) return alone();
+
+  // An aligned corner needs less parallax, so the noise of aligned corners decides whether to try. The rough
+  // point serves only to project the older patch.
   const auto rough = search.meet(point_of(newest), point_of(older), options.aligned);
   if (!rough) return std::nullopt;
 
@@ -182,6 +185,7 @@ std::optional<Meeting> meet(const maps::Map& map, const PairSearch& search, cons
       map, older, pose.inverse() * *rough, {image->levels, camera, pose, options.scale_factor}, patch.middle);
   if (!at) return alone();
 
+  // The rays are intersected again with the corner at its aligned position.
   const Eigen::Vector2f shift = *at - patch.middle;
   features::PointFeature moved = point_of(newest);
   moved.pixel += shift;
@@ -231,15 +235,19 @@ std::vector<core::PointId> triangulate_points(maps::Map& map, KeyframeId keyfram
 
   bool moved = false;
   for (KeyframeId other : neighbours) {
+    // The free corners are collected again for each neighbour, because some of
+    // them have got a landmark since.
     const FreeCorners a = free_corners_of(map, keyframe, max_measured_m);
     const FreeCorners b = free_corners_of(map, other, max_measured_m);
     const PairSearch search(a, b, camera, options);
+
     for (int i : a.free) {
       const int j = search.partner(i);
       if (j < 0 || map.point_of(other, j).valid()) continue;
       const auto found = meet(map, search, {keyframe, i}, {other, j}, camera, options, shown);
       if (!found) continue;
 
+      // The keyframe's corner moves to where it was aligned, so that both keyframes see the landmark exactly.
       if (found->shift) {
         shown->newest.move_point(static_cast<std::size_t>(i), *found->shift);
         moved = true;
@@ -252,6 +260,7 @@ std::vector<core::PointId> triangulate_points(maps::Map& map, KeyframeId keyfram
     }
   }
 
+  // The grid sorts corners by position and is outdated once some have moved.
   if (moved) shown->newest.grid = features::PointGrid(shown->newest.points, camera.width, camera.height);
   return made;
 }

@@ -37,6 +37,8 @@ int partner(const maps::Map& map, const maps::Observation& line, KeyframeId othe
             const TriangulationOptions& options) {
   const features::LineFeature& f =
       map.keyframe(line.keyframe).features->lines[static_cast<std::size_t>(line.feature)];
+
+  // A camera that has rolled about its optical axis sees every line turned by the same angle.
   const Eigen::Matrix3d turn =
       map.camera_from_world(other).rotation * map.camera_from_world(line.keyframe).rotation.transpose();
   const Eigen::Rotation2Df roll(static_cast<float>(std::atan2(turn(1, 0), turn(0, 0))));
@@ -55,6 +57,7 @@ int partner(const maps::Map& map, const maps::Observation& line, KeyframeId othe
       second_distance = std::min(second_distance, distance);
       continue;
     }
+
     second_distance = best_distance;
     best_distance = distance;
     best = static_cast<int>(j);
@@ -63,6 +66,8 @@ int partner(const maps::Map& map, const maps::Observation& line, KeyframeId othe
   if (best_distance > options.max_line_hamming || !(best_distance < options.ratio * second_distance))
     return -1;
 
+  // A partner that has a landmark or depth is refused only now: left out of the comparison, it would
+  // make room for the second best.
   const bool taken =
       map.line_of(other, best).valid() || measured(lines[static_cast<std::size_t>(best)], max_measured_m);
   return taken ? -1 : best;
@@ -83,6 +88,8 @@ geometry::TriangulatedLine agree(std::vector<Candidate>& candidates, const Trian
     return geometry::triangulate_line(views, how);
   };
 
+  // One wrong match spoils the intersection of all planes, so each partner in turn is left out; the
+  // first candidate is the line itself.
   geometry::TriangulatedLine line = attempt(candidates.size());
   const auto enough = static_cast<std::size_t>(options.min_line_views);
   for (std::size_t i = 1; !line.ok() && i < candidates.size() && candidates.size() > enough; ++i) {
@@ -113,6 +120,7 @@ std::vector<core::LineId> triangulate_lines(maps::Map& map, KeyframeId keyframe,
       if (j >= 0) candidates.push_back({{other, j}, view_of(map, {other, j}, camera)});
     }
 
+    // Two interpretation planes always intersect; only a third view can reveal a wrong match.
     if (static_cast<int>(candidates.size()) < options.min_line_views) continue;
     const geometry::TriangulatedLine line = agree(candidates, options);
     if (!line.ok()) continue;

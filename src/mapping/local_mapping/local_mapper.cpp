@@ -105,6 +105,8 @@ void LocalMapper::add_points(maps::Map& map, core::KeyframeId id, const cv::Mat&
   const geometry::Rigid3 world_from_camera = map.camera_from_world(id).inverse();
   for (std::size_t i = 0; i < features.points.size(); ++i) {
     const features::PointFeature& f = features.points[i];
+
+    // Corners without depth or beyond its useful range are left to triangulation.
     if (!(f.depth > 0.0F) || static_cast<double>(f.depth) > options_.max_landmark_depth_m) continue;
     if (map.point_of(id, static_cast<int>(i)).valid()) continue;
 
@@ -116,6 +118,7 @@ void LocalMapper::add_points(maps::Map& map, core::KeyframeId id, const cv::Mat&
     point.angle = f.angle;
     point.angle_keyframe = id;
 
+    // Descriptors match only in similar views, so the direction and distance of the first one are stored.
     point.view_direction = (point.position - world_from_camera.translation).normalized();
     point.normal = world_from_camera.rotation *
                    depth_normal(depth, f.pixel.cast<double>(), static_cast<double>(f.depth), camera_);

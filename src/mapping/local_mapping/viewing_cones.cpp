@@ -67,6 +67,8 @@ GridBalance grid_balance(const GridCounts& grid) {
   }
 
   if (!(sum > 0.0)) return balance;
+
+  // The ideal is 1: two equally full cells in opposite corners of the grid, 2 sqrt(2) cells apart.
   balance.ecog = (place(first) - place(second)).norm() * *second / (2.0 * std::sqrt(2.0) * *first);
   balance.offset = (centre / sum).norm();
   return balance;

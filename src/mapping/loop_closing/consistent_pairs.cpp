@@ -61,6 +61,8 @@ class CliqueSearch {
   /// Classes of which no two are joined; `colours` counts the classes up to each one of `order`.
   void paint(const std::vector<std::size_t>& rest, std::vector<std::size_t>& order,
              std::vector<std::size_t>& colours) const {
+    // Greedy colouring: a clique has at most one node of each class, so the
+    // number of classes bounds its size.
     std::vector<std::vector<std::size_t>> classes;
 
     for (const std::size_t v : rest) {
@@ -74,6 +76,8 @@ class CliqueSearch {
       }
     }
 
+    // Listed class by class, the bounds ascend, so the search ends at the first node that
+    // cannot improve the best clique.
     for (std::size_t c = 0; c < classes.size(); ++c) {
       for (const std::size_t v : classes[c]) {
         order.push_back(v);
@@ -153,6 +157,7 @@ std::vector<ConsistentSet> consistent_sets(const maps::Map& map_a, const maps::M
   std::iota(left.begin(), left.end(), std::size_t{0});
 
   while (!left.empty() && sets.size() < options.max_sets) {
+    // The largest set of pairs that all agree with one another is a maximum clique of their graph.
     std::vector<std::vector<bool>> joined(left.size(), std::vector<bool>(left.size()));
     for (std::size_t i = 0; i < left.size(); ++i) {
       for (std::size_t j = 0; j < left.size(); ++j) joined[i][j] = agreed[left[i]][left[j]];
@@ -160,6 +165,9 @@ std::vector<ConsistentSet> consistent_sets(const maps::Map& map_a, const maps::M
 
     std::vector<std::size_t> members;
     for (const std::size_t i : maximum_clique(joined, options.budget)) members.push_back(left[i]);
+
+    // A pair that agrees with half of the set is of the same alignment, up to noise,
+    // and must not support a rival one.
     const auto agrees = [&](std::size_t i) {
       std::size_t count = 0;
       for (const std::size_t m : members) count += m == i || agreed[i][m] ? 1U : 0U;

@@ -66,6 +66,9 @@ std::optional<Rigid3> InterRobotLoops::locate(places::Database& database, const 
 std::optional<Loop> InterRobotLoops::by_way_of(const maps::Map& map, const Loop& early, const Loop& late,
                                                double& chi2) const {
   const maps::Map& theirs = others_->map;
+
+  // Keyframes that are close in time or share landmarks are related better by
+  // the own map than by this detour.
   if (early.match.robot != late.match.robot || !map.has_keyframe(early.query) ||
       !theirs.has_keyframe(early.match) || !map.has_keyframe(late.query) ||
       map.keyframe(late.query).stamp - map.keyframe(early.query).stamp < options_.min_gap_s ||
@@ -80,11 +83,14 @@ std::optional<Loop> InterRobotLoops::by_way_of(const maps::Map& map, const Loop&
   Rigid3& late_from_early = loop.evidence.query_from_match;
   late_from_early = late_from_their_early * early.evidence.query_from_match.inverse();
 
+  // The errors of both recognitions and of the other robot's path between them add up.
   const Matrix6d covariance = late.evidence.information.inverse() +
                               seen_from(path_covariance(theirs, early.match, late.match), late_from_match) +
                               seen_from(early.evidence.information.inverse(), late_from_early);
   loop.evidence.information = covariance.inverse();
 
+  // Squared distance of the present relative pose from the measured one, in standard
+  // deviations of the measurement.
   const Rigid3 now = map.camera_from_world(late.query) * map.camera_from_world(early.query).inverse();
   const geometry::Vector6d error = geometry::log_se3(now * late_from_early.inverse());
   chi2 = error.dot(loop.evidence.information * error);
@@ -101,9 +107,12 @@ std::vector<Loop> InterRobotLoops::detect(places::Database& database, const maps
   const std::vector<Loop> sure = pending_.confirm(others_->map, map, keyframe, verified, options_);
   std::vector<Loop> loops;
 
+  // A confirmed sighting closes a loop only if an earlier one contradicts the present path beyond noise; of
+  // several the worst contradiction is used.
   for (const Loop& late : sure) {
     std::optional<Loop> worst;
     double most = optimize::chi_square_gate(6);
+
     for (const Loop& early : sightings_) {
       double chi2 = 0.0;
       auto loop = by_way_of(map, early, late, chi2);

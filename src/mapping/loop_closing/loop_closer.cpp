@@ -55,12 +55,14 @@ std::vector<Loop> LoopCloser::verify(const maps::Map& map, KeyframeId keyframe,
     trial.loop = {keyframe, candidate.keyframe, {}};
     trial.score = candidate.score;
 
+    // A seed of its own for each keyframe makes the result independent of what was verified before.
     const std::uint64_t seed = options_.seed + static_cast<std::uint64_t>(keyframe.index);
     trial.loop.evidence =
         verify_place({&map, keyframe, camera_}, {&map, candidate.keyframe, camera_}, options_.verify, seed);
     trial.refused = judge(map, trial);
     trials_.push_back(trial);
 
+    // Places that match, but farther off than drift explains, may be evidence against the path.
     if (!trial.refused.empty()) {
       if (trial.loop.evidence.accepted) far.push_back(std::move(trial.loop));
       continue;
@@ -142,6 +144,8 @@ std::vector<Loop> PendingLoops::confirm(const maps::Map& matches, const maps::Ma
   std::vector<PlacePair> pairs;
   for (const Loop& loop : waiting_) pairs.push_back({loop.match, loop.query, loop.evidence.query_from_match});
 
+  // A single match may be a place that looks alike: several keyframes must agree, and no
+  // other set may have nearly as many.
   const std::vector<ConsistentSet> sets = consistent_sets(matches, queries, pairs, options.consistency);
   if (sets.empty() || static_cast<int>(sets[0].keyframes_b) < options.agreeing) return {};
   if (sets.size() > 1 && static_cast<double>(sets[1].keyframes_b) >
@@ -151,6 +155,8 @@ std::vector<Loop> PendingLoops::confirm(const maps::Map& matches, const maps::Ma
 
   std::vector<Loop> result;
   for (const std::size_t i : sets[0].members) result.push_back(waiting_[i]);
+
+  // Without a match of the newest keyframe the set contains nothing that was not considered before.
   const bool fresh =
       std::any_of(result.begin(), result.end(), [&](const Loop& l) { return l.query == keyframe; });
   if (!fresh) return {};
@@ -162,6 +168,7 @@ std::vector<Loop> LoopCloser::detect(const maps::Map& map, KeyframeId keyframe) 
   const auto& features = map.keyframe(keyframe).features;
   if (features == nullptr) return {};
 
+  // Keyframes close in time or in view always look alike and are no loops.
   const auto related = map.covisible(keyframe, kRelated);
   const double now = map.keyframe(keyframe).stamp;
   const KeyframeId root = maps::root_of(map, keyframe);
@@ -175,11 +182,14 @@ std::vector<Loop> LoopCloser::detect(const maps::Map& map, KeyframeId keyframe) 
   const auto candidates =
       recogniser_.recognise(database_.query(*features), keyframe, last_, allowed, neighbours);
   const std::vector<Loop> verified = verify(map, keyframe, candidates);
+
+  // The keyframe is added after its own query; otherwise it would find itself.
   database_.add(keyframe, features);
   last_ = keyframe;
   std::vector<Loop> sure = pending_.confirm(map, map, keyframe, verified, options_);
   if (others_ == nullptr) return sure;
 
+  // Loops by way of other robots' maps must be explained by drift, too.
   for (const Loop& loop : others_->detect(database_, map, keyframe)) {
     LoopTrial trial;
     trial.loop = loop;
@@ -246,6 +256,7 @@ bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
                [&](const PoseEdge& e) { return map.has_keyframe(e.a) && map.has_keyframe(e.b); });
   if (all.size() == known) return false;
 
+  // Nothing in the map changes before it is known that the solution does not tear the tracked path.
   const MapGraphResult solved = solve_map_graph(map, all, options_.robust);
   if (!solved.summary.usable) return false;
   if (const auto wrong = contradiction(map, solved.poses)) {
@@ -268,9 +279,11 @@ bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
     if (i >= known) fresh.push_back(all[i]);
   }
 
+  // New loops may have shown that older ones were wrong, so the map's loops change even if none is new.
   set_loops(map, believed);
   if (fresh.empty()) return false;
 
+  // Duplicates can be found only after the keyframes are moved, when landmarks of both visits coincide.
   move_keyframes(map, solved.poses);
   for (const PoseEdge& edge : fresh) merge_duplicates(map, edge);
   ++counts_.accepted;

@@ -80,9 +80,11 @@ std::vector<std::pair<std::size_t, std::size_t>> alike_both_ways(const FrameFeat
   if (rows == 0 || columns == 0) return pairs;
   if (std::max(rows, columns) >> kIndexBits != 0) throw std::length_error("alike_both_ways: too many points");
 
+  // All distances are computed once and serve both directions of the search.
   std::vector<int> table(rows * columns);
   std::vector<std::uint32_t> nearest_in_b(rows);
   std::vector<std::uint32_t> nearest_in_a(columns, std::numeric_limits<std::uint32_t>::max());
+
   for (std::size_t i = 0; i < rows; ++i) {
     int* row = table.data() + i * columns;
     features::hamming_distances(a.descriptors[i], b.descriptors.data(), columns, row);
@@ -91,6 +93,8 @@ std::vector<std::pair<std::size_t, std::size_t>> alike_both_ways(const FrameFeat
                                    nearest_in_a.data());
   }
 
+  // Repeated texture is ambiguous: each feature must be the other's nearest,
+  // clearly nearer than any elsewhere.
   for (std::size_t i = 0; i < rows; ++i) {
     const std::size_t j = index_of(nearest_in_b[i]);
     if (index_of(nearest_in_a[j]) != i || nearest_in_b[i] >> kIndexBits > kMaxHamming) continue;

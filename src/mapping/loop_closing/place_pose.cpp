@@ -93,11 +93,13 @@ std::vector<Rigid3> from_points(const Sample& sample, const sensor::Pinhole& cam
     image.emplace_back(pair->query.x(), pair->query.y());
   }
 
+  // P3P needs no initial pose, and none is known for a place that may have been seen long ago.
   const cv::Matx33d k(camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0);
   std::vector<cv::Mat> rotations;
   std::vector<cv::Mat> translations;
   cv::solveP3P(space, image, k, cv::noArray(), rotations, translations, cv::SOLVEPNP_AP3P);
 
+  // Degenerate samples, such as points on one line, may yield solutions that are not finite.
   std::vector<Rigid3> poses;
   for (std::size_t i = 0; i < rotations.size(); ++i) {
     const auto r = [&](int row) { return rotations[i].at<double>(row); };
@@ -163,6 +165,7 @@ std::optional<RansacPose> ransac_pose(const PosePairs& pairs, const sensor::Pinh
     if (pair.in_space) in_space.push_back(&pair);
   }
 
+  // Lines help where points are few; with many points, samples of lines would only take time.
   const bool by_points = pairs.points.size() >= 4;
   const bool by_lines = in_space.size() >= 3 && pairs.points.size() < kFewPoints;
   if (!by_points && !by_lines) return std::nullopt;
@@ -195,6 +198,7 @@ std::optional<RansacPose> ransac_pose(const PosePairs& pairs, const sensor::Pinh
       if (pose) try_pose(*pose);
     }
 
+    // If lines are drawn, too, only every other round draws points, so twice as many rounds are needed.
     const double share =
         static_cast<double>(best_count) / static_cast<double>(pairs.points.size() + pairs.lines.size());
     needed = std::min(max_rounds, std::max(20, (by_lines ? 2 : 1) * rounds_needed(share, 3, max_rounds)));

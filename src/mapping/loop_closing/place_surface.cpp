@@ -48,6 +48,7 @@ SurfaceVotes vote_surface(const std::vector<maps::SurfaceSample>& samples,
     const int y = static_cast<int>(std::floor(pixel.y() * scale_y));
     if (x < 1 || y < 1 || x + 1 >= other_depth.cols || y + 1 >= other_depth.rows) continue;
 
+    // The range of depths around the pixel allows for slanted surfaces and for a small error of the pose.
     float low = 1e9F;
     float high = 0.0F;
     int measured = 0;
@@ -63,7 +64,10 @@ SurfaceVotes vote_surface(const std::vector<maps::SurfaceSample>& samples,
     }
     if (measured < kMinNeighbours) continue;
 
+    // A surface in front of the measured depth was seen through, which contradicts the pose;
+    // one behind it may only be hidden.
     const double tolerance = 0.04 + 3.0 * sensor::depth_sigma(p.z());
+
     if (p.z() < static_cast<double>(low) - tolerance) {
       ++votes.contradicted;
     } else if (p.z() > static_cast<double>(high) + tolerance) {

@@ -61,6 +61,9 @@ PosePairs pairs_by_descriptor(const PlaceView& query, const PlaceView& match,
   const FrameFeatures& q = features_of(query);
   const FrameFeatures& m = features_of(match);
   PosePairs pairs;
+
+  // Cameras with different focal lengths show the same corner in different octaves, so its
+  // size in space is compared instead.
   const bool differ = std::abs(std::log(query.camera.fx / match.camera.fx)) > kSimilarFocals;
   std::optional<SizeGate> gate;
   if (differ) gate = size_gate(m, match.camera.fx, q, query.camera.fx, how.orb_scale_factor);
@@ -75,6 +78,7 @@ PosePairs pairs_by_descriptor(const PlaceView& query, const PlaceView& match,
     pairs.points.push_back(pair);
   }
 
+  // The limits are wide, because a place may be seen again from another distance and with a rolled camera.
   features::LineMatchOptions options;
   options.max_angle_rad = 1.0;
   options.min_length_ratio = 0.3;
@@ -146,6 +150,7 @@ class Growth {
     problem.points = tracking::point_terms(*match_.map, points, features, association_);
     problem.lines = tracking::line_terms(*match_.map, lines, features, kLineSigma_px);
 
+    // Outliers still affect the first pose by which they are judged, so they are removed in two rounds.
     for (int round = 0; round < 2; ++round) {
       summary = optimize::solve_pose(problem, camera_from_world, solver_);
       camera_from_world = summary.camera_from_world;
@@ -155,6 +160,7 @@ class Growth {
                              problem.lines);
     }
 
+    // The final pose and its information rest on the inliers alone.
     summary = optimize::solve_pose(problem, camera_from_world, solver_);
     camera_from_world = summary.camera_from_world;
   }

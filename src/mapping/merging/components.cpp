@@ -34,6 +34,8 @@ void Components::verify(const maps::Map& map, KeyframeId keyframe, KeyframeId ro
   const auto elsewhere = [&](KeyframeId id) {
     return map.has_keyframe(id) && maps::root_of(map, id) != root;
   };
+
+  // Hits come best first, so the first one below the threshold ends the search.
   for (const places::Hit& hit : places.query(*features).best(kLookAlikesTried, elsewhere)) {
     if (hit.score < options_.places.min_absolute) return;
     const std::uint64_t seed = options_.seed + 7919U * static_cast<std::uint64_t>(keyframe.index) +
@@ -42,6 +44,8 @@ void Components::verify(const maps::Map& map, KeyframeId keyframe, KeyframeId ro
         keyframe, hit.keyframe,
         verify_place({&map, keyframe, camera_}, {&map, hit.keyframe, camera_}, options_.verify, seed)};
     if (!pair.evidence.accepted) continue;
+
+    // Evidence is collected for each pair of components, because one match alone does not decide.
     const KeyframeId other = maps::root_of(map, hit.keyframe);
     pairs_[std::minmax(root, other)].verified.push_back(std::move(pair));
   }

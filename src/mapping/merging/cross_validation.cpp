@@ -66,6 +66,8 @@ std::vector<VerifiedPair> verify_neighbours(const PartPair& maps, const PairSets
     seen.emplace(std::min(pair.query, pair.match), std::max(pair.query, pair.match));
 
   std::vector<OverlapFinder::Candidate> candidates;
+
+  // Rival alignments are tested like the leading one, so that the additional views decide between them.
   for (std::size_t i = 0; i < std::min(kSets, sets.sets.size()); ++i) {
     const Rigid3 a_from_b = mean_alignment(maps, sets.places_of(i)).a_from_b;
     std::size_t added = 0;
@@ -76,6 +78,7 @@ std::vector<VerifiedPair> verify_neighbours(const PartPair& maps, const PairSets
       ++added;
     };
 
+    // Keyframes of either map are paired with the most similar view of the other one under this alignment.
     for (const KeyframeId id : b.keyframe_ids()) {
       add(maps.b, id, maps.a, nearest_view(a, a_from_b, b.camera_from_world(id).inverse(), kMay));
     }
@@ -98,10 +101,12 @@ CrossValidation cross_validate(const PartPair& maps, const std::vector<VerifiedP
   for (const VerifiedPair& pair : agreeing)
     agreed.insert(b.has_keyframe(pair.query) ? pair.query : pair.match);
 
+  // If the alignment is right, keyframes that lie close together in it see the same. The agreeing ones do.
   std::vector<OverlapFinder::Candidate> open;
   for (const KeyframeId id : b.keyframe_ids()) {
     const KeyframeId near = nearest_view(a, a_from_b, b.camera_from_world(id).inverse(), kMust);
     if (!near.valid()) continue;
+
     if (agreed.count(id) != 0) {
       ++result.confirmed;
     } else {
@@ -109,6 +114,7 @@ CrossValidation cross_validate(const PartPair& maps, const std::vector<VerifiedP
     }
   }
 
+  // A sample that is spread evenly over the map is representative and bounds the time.
   std::vector<OverlapFinder::Candidate> tried;
   const std::size_t step = std::max<std::size_t>((open.size() + kMost - 1) / kMost, 1);
   for (std::size_t i = 0; i < open.size(); i += step) tried.push_back(open[i]);
@@ -125,6 +131,7 @@ CrossValidation cross_validate(const PartPair& maps, const std::vector<VerifiedP
     result.pairs.push_back(fresh.pairs[i]);
   }
 
+  // Log odds of one place against one that looks alike in part, where fewer keyframes would be confirmed.
   const double missed = result.expected - result.confirmed;
   result.against_like = result.confirmed * std::log(kConfirmed / kConfirmedByLike) +
                         missed * std::log((1.0 - kConfirmed) / (1.0 - kConfirmedByLike));

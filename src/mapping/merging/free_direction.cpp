@@ -29,12 +29,16 @@ FreeDirection free_direction(const maps::Map& a, const maps::Map& b, const geome
   std::set<core::KeyframeId> keyframes;
   for (const VerifiedPair& pair : agreeing) keyframes.insert({pair.query, pair.match});
 
+  // The scatter of the normals shows which directions surfaces constrain: the eigenvector of its
+  // least eigenvalue is the freest one.
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   double count = 0.0;
+
   for (const core::KeyframeId id : keyframes) {
     const Eigen::Matrix3d a_from_camera = a.has_keyframe(id)
                                               ? a.camera_from_world(id).inverse().rotation
                                               : (a_from_b * b.camera_from_world(id).inverse()).rotation;
+
     for (const maps::SurfaceSample& sample : (a.has_keyframe(id) ? a : b).keyframe(id).surface) {
       const Eigen::Vector3d normal = a_from_camera * sample.normal.cast<double>();
       scatter += normal * normal.transpose();
@@ -45,6 +49,8 @@ FreeDirection free_direction(const maps::Map& a, const maps::Map& b, const geome
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(scatter / std::max(1.0, count));
   FreeDirection free{axes.eigenvalues()[0], axes.eigenvalues()[1], 0.0};
 
+  // The reach is measured along the free direction of a corridor, or within the plane of a lone wall,
+  // where two directions are free.
   const auto extent = [&](int axis) {
     const Eigen::Vector3d direction = axes.eigenvectors().col(axis);
     return std::min(extent_along(a, direction), extent_along(b, a_from_b.rotation.transpose() * direction));

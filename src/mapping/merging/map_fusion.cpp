@@ -54,6 +54,9 @@ Layout lay_out(const std::vector<MapPart>& parts, const std::vector<MergeEvidenc
     for (const MergeEvidence* merge : order) {
       const bool has_a = anchor_from_part.count(merge->a) != 0;
       const bool has_b = anchor_from_part.count(merge->b) != 0;
+
+      // A merge attaches a part only if exactly one of its ends has a place;
+      // with both it would close a circle.
       if (has_a == has_b) continue;
 
       if (has_a) {
@@ -194,6 +197,7 @@ FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>
   fused.map = joined(maps, fused.anchor_from_part);
   for (const auto& [root, parent] : layout.ties) fused.map.set_parent(root, parent);
 
+  // Only merges within the anchor's group have both ends in the joined map.
   std::vector<PoseEdge> edges;
   std::vector<MergeEvidence*> used;
   for (MergeEvidence& merge : merges) {
@@ -214,6 +218,7 @@ FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>
   adjustment.noise.orb_scale_factor = options.verify.orb_scale_factor;
   adjustment.bundle = false;  // before surfaces are aligned it would bend a map with a narrow overlap
 
+  // The pose graph may reject most pairs of a merge; the maps are then fused again without it.
   const GlobalAdjustmentSummary graph = adjust_map(fused.map, fused.cameras, edges, adjustment, ids.front());
   fused.refused = graph.refused;
   fused.refusal = graph.refusal;

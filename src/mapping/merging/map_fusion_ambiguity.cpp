@@ -112,11 +112,15 @@ double log_odds(const Ambiguity& ambiguity, int places, const MapFusionOptions& 
 
 std::string objection(const Ambiguity& ambiguity, int places, const MapFusionOptions& options) {
   const OverlayFit& overlap = ambiguity.overlap;
+
+  // No landmark can be where the other map looked through; many such cases refute the alignment.
   if (overlap.expected + overlap.contradicted >= kFewLandmarks && overlap.seen_through() > kWrong) {
     return fmt::format("the aligned maps contradict each other: {} of the landmarks were seen through",
                        percent(overlap.seen_through()));
   }
 
+  // Agreeing keyframes and landmarks must outweigh the small prior probability that
+  // two maps share a place at all.
   if (const double odds = log_odds(ambiguity, places, options); odds < -std::log(options.prior_wrong)) {
     return fmt::format(
         "keyframes of {} places agree, and {} of {} landmarks are found: the odds that it is one place are "
@@ -124,6 +128,7 @@ std::string objection(const Ambiguity& ambiguity, int places, const MapFusionOpt
         places, overlap.matched, overlap.expected, std::exp(odds), 1.0 / options.prior_wrong);
   }
 
+  // Another alignment fits as well, as along a corridor with equal doors, so neither is certain.
   if (ambiguity.alternative_m > 0.0) {
     return fmt::format(
         "places look alike here and may be copies: {:.1f} m away the maps fit too ({} of the landmarks are "

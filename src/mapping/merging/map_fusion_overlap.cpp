@@ -118,11 +118,14 @@ std::vector<OverlapFinder::Candidate> OverlapFinder::recognise(const places::Dat
                                  : parts[where].map->neighbours(id, kSurroundings);
   };
 
+  // Similar views within one map are its own loops, not overlaps with another map.
   const auto allowed = [&](KeyframeId id) {
     const std::size_t where = part_of(parts, id);
     return where != part && where != parts.size();
   };
 
+  // Scores count relative to that of the keyframe before, because they all depend
+  // on how distinctive the scene is.
   const KeyframeId usual = before.valid() && database_.contains(before) ? before : KeyframeId{};
   for (const places::Candidate& c : recogniser_.recognise(scores, keyframe, usual, allowed, neighbours)) {
     result.push_back({keyframe, c.keyframe, part, part_of(parts, c.keyframe), c.score});
@@ -139,6 +142,7 @@ std::vector<OverlapFinder::Candidate> OverlapFinder::look_at_all(const std::vect
     KeyframeId before;
   };
 
+  // A part may hold several robots, and the first keyframe of each has none before it.
   std::vector<Query> queries;
   for (std::size_t p = 0; p < parts.size(); ++p) {
     KeyframeId before;
@@ -146,10 +150,12 @@ std::vector<OverlapFinder::Candidate> OverlapFinder::look_at_all(const std::vect
       if (parts[p].map->keyframe(id).features != nullptr) {
         queries.push_back({p, id, before.robot == id.robot ? before : KeyframeId{}});
       }
+
       before = id;
     }
   }
 
+  // Scores do not depend on one another and are computed in parallel; recognition runs in order.
   constexpr std::size_t kAtATime = 256;  // keyframes scored at a time, to bound memory
   std::vector<Candidate> candidates;
   for (std::size_t first = 0; first < queries.size(); first += kAtATime) {
@@ -190,6 +196,7 @@ MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, s
   merge.a = a;
   merge.b = b;
 
+  // Few agreeing pairs may be chance, or all that was tried so far: the keyframes around them decide.
   PairSets sets = pair_sets(maps, found);
   if (!sets.sets.empty() && support(sets.sets.front()) < options.min_pairs) {
     std::vector<VerifiedPair> more = verify_neighbours(maps, sets, found);
@@ -202,6 +209,7 @@ MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, s
   merge.pairs = merge.consistency.pairs;
   merge.refused = objection(maps, merge.consistency, merge.alignment.a_from_b);
 
+  // The first objection ends the examination, because the remaining tests are expensive.
   if (merge.refused.empty()) {
     merge.ambiguity = ambiguity_of(maps, sets, merge.alignment.a_from_b);
     merge.refused = objection(merge.ambiguity, merge.consistency.places, options);
@@ -285,6 +293,8 @@ std::vector<MergeEvidence> find_overlaps(const std::vector<MapPart>& parts,
   executor.parallel_for(tried.size(),
                         [&](std::size_t i) { verified[i] = verify_candidate(parts, tried[i], options); });
 
+  // Every two parts are decided by themselves; contradictions between merges appear
+  // later, in the joint pose graph.
   std::vector<MergeEvidence> merges;
   for (std::size_t a = 0; a < parts.size(); ++a) {
     for (std::size_t b = a + 1; b < parts.size(); ++b) {

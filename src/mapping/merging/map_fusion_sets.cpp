@@ -56,6 +56,8 @@ Alignment mean_alignment(const PartPair& maps, const std::vector<PlacePair>& pai
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const PlacePair& pair : pairs) middle += b.camera_from_world(pair.b).inverse().translation / n;
 
+  // Errors are compared at the middle of the cameras: about a distant origin a small rotation
+  // would look like a large shift.
   const Rigid3 b_from_middle(Eigen::Matrix3d::Identity(), middle);
   Rigid3 estimate = worlds(a, b, pairs.front()) * b_from_middle;
   std::vector<Vector6d> errors(pairs.size());
@@ -67,6 +69,8 @@ Alignment mean_alignment(const PartPair& maps, const std::vector<PlacePair>& pai
       const Rigid3 measured = worlds(a, b, pairs[i]) * b_from_middle;
       errors[i] << measured.translation - estimate.translation,
           geometry::log_so3(measured.rotation * estimate.rotation.transpose());
+
+      // Huber weights: a pair that is far off pulls no harder than one at the threshold.
       Vector6d scaled = errors[i];
       scaled.tail<3>() *= kArm_m;
       const double weight = std::min(1.0, kHuber_m / std::max(1e-9, scaled.norm()));

@@ -130,8 +130,10 @@ void MapOverlay::overlay(const Side& moved, const Side& fixed, const Rigid3& fix
     const Eigen::Vector3d at = fixed_from_moved * landmark.position;
     const Eigen::Vector3d direction = fixed_from_moved.rotation * landmark.view;
     bool there = false;
-
     bool through = false;
+
+    // Only views from a similar side and distance count: from elsewhere the corner looks different, and
+    // its absence would prove nothing.
     for (const PlacedView& view : views) {
       const Eigen::Vector3d in_camera = view.camera_from_world * at;
       const double distance = in_camera.norm();
@@ -146,6 +148,7 @@ void MapOverlay::overlay(const Side& moved, const Side& fixed, const Rigid3& fix
       through = through || what == Seen::kThrough;
     }
 
+    // A surface that one view confirms exists, even if another one with a slightly wrong pose looks past it.
     if (there) {
       ++sum.expected;
       match(fixed, landmark, at, sum);

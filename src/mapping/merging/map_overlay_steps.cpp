@@ -26,6 +26,7 @@ class Peaks {
   }
   /// Means of the fullest blocks of eight bins, no two of one peak.
   [[nodiscard]] std::vector<Eigen::Vector3d> highest(std::size_t most) const {
+    // The blocks of eight bins overlap, so that a peak on the border between bins is not divided.
     std::map<std::uint64_t, std::size_t> counts;
     for (const auto& bin : bins_) {
       for (int corner = 0; corner < 8; ++corner) {
@@ -39,6 +40,7 @@ class Peaks {
       return x.first != y.first ? x.first > y.first : x.second < y.second;
     });
 
+    // Overlapping blocks share a peak, which must be listed only once.
     std::vector<Eigen::Vector3d> result;
     for (const auto& block : blocks) {
       if (result.size() >= most) break;
@@ -91,6 +93,8 @@ class Peaks {
 void MapOverlay::vote(const Side& moved, const Side& fixed, const Rigid3& fixed_from_moved,
                       const std::vector<VerifiedPair>& pairs, std::vector<Eigen::Vector3d>& steps) {
   const maps::Map& map = *moved.part.map;
+
+  // Landmarks of the agreeing keyframes vote; one that was seen only once may be a wrong measurement.
   std::set<core::PointId> ids;
   for (const VerifiedPair& pair : pairs) {
     for (const core::PointId id : map.points_of(map.has_keyframe(pair.query) ? pair.query : pair.match)) {
@@ -103,6 +107,8 @@ void MapOverlay::vote(const Side& moved, const Side& fixed, const Rigid3& fixed_
   for (const Landmark& l : fixed.landmarks) descriptors.push_back(l.descriptor);
 
   std::vector<int> distances(descriptors.size());
+
+  // A landmark votes for the steps to all that look like it: where the scene repeats, many of them are equal.
   for (std::size_t v = 0; v < voters.size(); v += stride(voters.size(), kMostVoters)) {
     const Landmark voter = landmark(map, voters[v]);
     const Eigen::Vector3d at = fixed_from_moved * voter.position;

@@ -177,6 +177,8 @@ void MergeServer::decide(const Robots& robots, const NewKeyframe& keyframe) {
   const maps::Map& b = *work_.maps[robots.second];
   MergeEvidence merge =
       decide_overlap(work_.parts, robots.first, robots.second, pair.verified, options_, *executor_);
+
+  // The decision may have verified further pairs, which are kept as evidence for the next one.
   std::set<std::pair<KeyframeId, KeyframeId>> known;
   for (const VerifiedPair& old : pair.verified) known.emplace(old.query, old.match);
 
@@ -192,6 +194,7 @@ void MergeServer::decide(const Robots& robots, const NewKeyframe& keyframe) {
     return;
   }
 
+  // The alignment is stored relative to two keyframes, so that it stays valid while both maps still change.
   const VerifiedPair& one = merge.pairs[merge.pairs.size() / 2];
   pair.a = a.has_keyframe(one.query) ? one.query : one.match;
   pair.b = pair.a == one.query ? one.match : one.query;

@@ -54,11 +54,14 @@ std::optional<double> grey_at(const Picture& picture, const Eigen::Vector3d& poi
   const int y = static_cast<int>(std::floor(pixel.y()));
   if (x < 0 || y < 0 || x + 1 >= picture.grey->cols || y + 1 >= picture.grey->rows) return {};
 
+  // A different depth shows that something hides the point or that it is not there.
   const double z = static_cast<double>(picture.depth->at<float>(static_cast<int>(std::lround(pixel.y())),
                                                                 static_cast<int>(std::lround(pixel.x()))));
   const double tolerance = 0.06 + 3.0 * sensor::depth_sigma(point.z());
   if (z <= 0.0 || std::abs(z - point.z()) > tolerance) return {};
 
+  // Bilinear interpolation, because the error of the nearest pixel would lower the
+  // correlation of such small pictures.
   const double right = pixel.x() - x;
   const double below = pixel.y() - y;
   const float* top = picture.grey->ptr<float>(y) + x;

@@ -67,11 +67,13 @@ Overlap overlap_of(const cloud::SurfaceSearch& surface, const cloud::SurfaceSear
   const Eigen::Vector3f translation = other_from_surface.translation.cast<float>();
   Overlap found;
 
+  // A regular sample suffices for the share, and for the points to be matched.
   std::size_t tried = 0;
   for (std::size_t i = 0; i < cloud.size(); i += 1 + cloud.size() / kTried, ++tried) {
     SurfacePoint p = cloud[i];
     p.getVector3fMap() = rotation * cloud[i].getVector3fMap() + translation;
     p.getNormalVector3fMap() = rotation * cloud[i].getNormalVector3fMap();
+
     if (cloud::nearest_facing(*other.tree(), p, static_cast<float>(options.distance_m),
                               static_cast<float>(options.min_cosine)) >= 0) {
       found.points.push_back(static_cast<int>(i));
@@ -112,6 +114,9 @@ class Aligner {
   }
   bool align(bool narrow) {
     constexpr double kStill_m = 5e-4;
+
+    // The wide pass brings the surfaces together; the narrow one leaves out matches
+    // that were in reach only by chance.
     const double distance = narrow ? 0.5 * options_.distance_m : options_.distance_m;
     const double still = narrow ? kStill_m : 0.02 * options_.distance_m;
     estimation_->setNarrow(narrow);
@@ -133,6 +138,7 @@ class Aligner {
     pcl::transformPointCloudWithNormals(*a_.cloud(), moved,
                                         result_.b_from_a.isometry().matrix().cast<float>().eval());
 
+    // PCL returns only a pose: information, inliers and residual follow from the correspondences there.
     pcl::Correspondences found;
     correspondences_->setInputSource(std::make_shared<SurfaceCloud>(moved));
     correspondences_->determineCorrespondences(found, distance);

@@ -105,6 +105,7 @@ struct Common {
 /// Numbers of voxels that local maps have in common; a < b, sorted by a, then b.
 std::vector<Common> common_voxels(const std::vector<std::vector<std::uint64_t>>& keys,
                                   const core::Executor& executor) {
+  // Sorted by voxel, all local maps that share a voxel stand next to one another.
   std::vector<std::pair<std::uint64_t, std::uint32_t>> filled;  // voxel, local map
   for (std::size_t i = 0; i < keys.size(); ++i) {
     for (const std::uint64_t key : keys[i]) filled.emplace_back(key, static_cast<std::uint32_t>(i));
@@ -115,6 +116,9 @@ std::vector<Common> common_voxels(const std::vector<std::vector<std::uint64_t>>&
   for (std::size_t i = 0; i < filled.size(); ++i) places[filled[i].second].push_back(i);
 
   std::vector<std::vector<Common>> found(keys.size());
+
+  // Each local map counts only later ones, so that every pair is counted once and
+  // each thread has a list of its own.
   executor.parallel_for(keys.size(), [&](std::size_t a) {
     std::vector<std::uint32_t> voxels(keys.size(), 0);
     for (const std::size_t i : places[a]) {
@@ -187,6 +191,7 @@ std::vector<LocalMapPair> overlapping_pairs(const maps::Map& map, const std::vec
   executor.parallel_for(local_maps.size(),
                         [&](std::size_t i) { keys[i] = filled_voxels(map, local_maps[i], options.voxel_m); });
 
+  // The overlap is a share of the smaller local map: a small one inside a large one overlaps completely.
   std::vector<LocalMapPair> candidates;
   for (const auto& [a, b, voxels] : common_voxels(keys, executor)) {
     const double overlap =
@@ -198,6 +203,8 @@ std::vector<LocalMapPair> overlapping_pairs(const maps::Map& map, const std::vec
                    [](const LocalMapPair& a, const LocalMapPair& b) { return a.overlap > b.overlap; });
   std::vector<int> taken(local_maps.size(), 0);
 
+  // A pair is left out only if both have enough partners, so that a local map
+  // with few overlaps keeps them all.
   std::vector<LocalMapPair> pairs;
   for (const LocalMapPair& pair : candidates) {
     if (taken[pair.a] >= options.per_map && taken[pair.b] >= options.per_map) continue;

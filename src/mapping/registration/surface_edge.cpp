@@ -76,6 +76,8 @@ std::optional<maps::SurfaceEdge> align_surface_edge(const maps::Keyframe& a, cor
                                                     const EdgeImages& images) {
   if (a.surface.empty()) return std::nullopt;
   const std::vector<tracking::WorldSurface> surface = surface_of(a);
+
+  // The weak prior keeps the alignment from sliding on noise along directions that the surfaces leave free.
   optimize::PoseProblem problem;
   problem.camera = camera;
   problem.prior = weak_prior(b_from_a, middle_in_view(surface, b_from_a, camera), options.hold_m);
@@ -87,6 +89,9 @@ std::optional<maps::SurfaceEdge> align_surface_edge(const maps::Keyframe& a, cor
   optimize::PoseSummary summary;
   Rigid3 pose = b_from_a;
   const tracking::PhotometricView view{images.of_b, &depth_of_b, depth_from_camera, camera};
+
+  // The radius of association, in metres, is wide at first, because the start is uncertain, and then shrinks
+  // to exclude wrong associations.
   for (const double distance : {0.08, 0.05, 0.03, 0.03, 0.03}) {
     tracking::SurfaceAssociationOptions association;
     association.max_distance_m = distance;
@@ -101,6 +106,7 @@ std::optional<maps::SurfaceEdge> align_surface_edge(const maps::Keyframe& a, cor
         tracking::associate_surface(surface, {depth_of_b, camera, pose, depth_from_camera}, association);
     summary = optimize::solve_pose(problem, pose, solver);
 
+    // Grey values may disagree, as after a change of light; the surfaces then decide alone.
     if (problem.photometric &&
         !tracking::photometric_agrees(*problem.photometric, summary.camera_from_world)) {
       problem.photometric.reset();

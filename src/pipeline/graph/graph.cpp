@@ -67,12 +67,14 @@ core::Result<Graph> build_graph(std::optional<ConfigNode> own, const std::filesy
   const auto root = with_includes(std::move(*own), file, pipelines_folder, problems);
   if (!root) return refuse();
 
+  // All steps add to one list of problems, so that a user sees every mistake of a file at once.
   read_description(*root, graph, problems);
   StageSpecs specs = read_stages(*root, registry, problems);
   connect(specs, problems);
   add_taps(*root, registry, specs, problems);
   apply_overrides(overrides, specs, problems);
 
+  // Stages are checked after --set, as they must see the values that the run will use.
   const CheckContext context{file.parent_path(), pipelines_folder, &registry.filters()};
   for (StageSpec& spec : specs) {
     if (spec.node.stage) check_stage(spec, context, problems);

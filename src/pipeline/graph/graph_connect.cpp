@@ -51,6 +51,7 @@ class Connector {
     const std::string path = spec.path + ".inputs";
     const std::size_t before = problems_.size();
 
+    // A malformed list hides every input that was meant; to report them as missing as well would mislead.
     if (inputs != nullptr && inputs->kind != Kind::kMap && inputs->kind != Kind::kNull) {
       problems_.push_back({inputs->mark, path, "must be a map, e.g. {frame: read}"});
       spec.dangling = true;
@@ -65,6 +66,7 @@ class Connector {
       }
     }
 
+    // A misspelt input is one mistake: it is reported as unknown, and not as missing as well.
     for (const Port& port : ports) {
       if (!port.required || (inputs != nullptr && inputs->find(port.name) != nullptr)) continue;
       if (std::find(meant_.begin(), meant_.end(), port.name) != meant_.end())
@@ -111,6 +113,7 @@ class Connector {
                                             core::hint(stage_name, names_of(specs_))));
     }
 
+    // The dependency counts even if the port turns out wrong: cycles and unused stages are judged by it.
     spec.reads_from.push_back(giver);
     const StageTypePtr& type = specs_[giver].node.type;
     if (type == nullptr) return;  // reported already
@@ -122,6 +125,7 @@ class Connector {
       return;
     }
 
+    // The message lists what this stage gives and which stages would fit, so that the line can be repaired.
     std::vector<std::string> given;
     for (const Port& p : type->outputs) given.push_back(p.name + " (" + p.type.name + ")");
     problem(from.mark, fmt::format("'{}' does not give the {} that is needed here; it gives {} ({})",

@@ -45,6 +45,8 @@ std::string to_dot(const Graph& graph) {
   }
 
   for (const Node& node : graph.nodes) text += box(node);
+
+  // Solid edges carry a value for each frame, dashed ones a single value after the last frame.
   for (const Node& node : graph.nodes) {
     for (const auto& input : node.inputs) {
       if (!input) continue;

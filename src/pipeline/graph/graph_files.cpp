@@ -53,9 +53,12 @@ void check_files(const StageSpecs& specs, core::ConfigProblems& problems) {
   for (const std::string& file : kFilesOfTheRun) writers.push_back({"the run itself", file});
   for (const StageSpec& spec : specs) {
     if (!spec.node.stage) continue;
+
+    // The files of one stage may overlap, as a folder and what is in it do; only other stages are rivals.
     const std::size_t others = writers.size();
 
     for (const std::string& file : spec.node.stage->files()) {
+      // Without a normal form "a/../map.ply" and "map.ply" would pass as two files.
       const std::string normal = std::filesystem::path(file).lexically_normal().generic_string();
       const auto taken = std::find_if(writers.begin(), writers.begin() + static_cast<std::ptrdiff_t>(others),
                                       [&](const Writer& writer) { return clash(writer.file, normal); });

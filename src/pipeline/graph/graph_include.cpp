@@ -113,6 +113,7 @@ class Includer {
       return own.find("include") == nullptr ? std::optional(std::move(own)) : std::nullopt;
     }
 
+    // The file counts as open until its includes are read: an include of an open file closes a circle.
     open_.push_back(fs::weakly_canonical(file));
     ConfigNode base;
     base.kind = Kind::kMap;
@@ -127,6 +128,7 @@ class Includer {
     open_.pop_back();
     if (!complete) return std::nullopt;
 
+    // Removal comes before the file's own stages: a stage may be removed and then defined again from scratch.
     for (const ConfigNode* name : removes) remove(*name, base);
     drop_unknown_changes(own, base);
     base.mark = own.mark;
@@ -162,6 +164,8 @@ class Includer {
     }
 
     const fs::path canonical = fs::weakly_canonical(file);
+
+    // A circle would run into the limit of files; the message shows it from file to file instead.
     const auto again = std::find(open_.begin(), open_.end(), canonical);
     if (again != open_.end()) {
       std::vector<std::string> circle;

@@ -28,6 +28,7 @@ void apply(const std::string& text, StageSpecs& specs, ConfigProblems& problems)
     problems.push_back({kCommandLine, path, std::move(what)});
   };
 
+  // Keys contain dots themselves (camera.refine), so the name of the stage ends at the first one.
   const std::size_t equals = text.find('=');
   const std::size_t dot = text.find('.');
   if (equals == std::string::npos || dot == std::string::npos || dot == 0 || dot + 1 >= equals) {
@@ -47,6 +48,7 @@ void apply(const std::string& text, StageSpecs& specs, ConfigProblems& problems)
     return refuse(path, fmt::format("there is no stage '{}'{}", stage, core::hint(stage, names_of(specs))));
   }
 
+  // The graph has been connected already, from the file alone: options are all that can still change.
   if (key == "type" || key == "inputs") {
     return refuse(path, "only options can be set; change the graph in a pipeline file");
   }

@@ -41,6 +41,7 @@ void read_stage(const StageRegistry& registry, StageSpec& spec, ConfigProblems& 
     return;
   }
 
+  // Options are declared by the stage itself; type and inputs are keys of the graph and not among them.
   spec.node.stage = spec.node.type->make();
   spec.node.stage->declare(spec.node.options);
   spec.node.options.set_all(body, spec.path, problems, {"type", "inputs"});
@@ -78,6 +79,7 @@ StageSpecs read_stages(const ConfigNode& root, const StageRegistry& registry, Co
                           "a stage's name is made of a-z, 0-9 and _, a letter first"});
     }
 
+    // A stage with problems is kept: without it, every stage that reads from it would be reported too.
     StageSpec spec;
     spec.node.name = name;
     spec.mark = stages->key_marks[i];

@@ -36,6 +36,8 @@ std::optional<OutputRef> find_port(const StageSpecs& specs, const ConfigNode& po
   std::vector<std::string> ports;
   for (const Port& p : type->outputs) ports.push_back(p.name);
   if (ports.empty()) return refuse(fmt::format("'{}' gives nothing that could be written", name));
+
+  // The port may be left out only where there is no choice.
   if (dot == std::string::npos && ports.size() == 1) return OutputRef{giver, 0};
 
   const std::string wanted = dot == std::string::npos ? "" : port.scalar.substr(dot + 1);
@@ -69,6 +71,7 @@ void add_taps(const ConfigNode& root, const StageRegistry& registry, StageSpecs&
     const auto from = find_port(specs, *port, path, problems);
     if (!from) continue;
 
+    // From here on a tap is a stage like any other: order, options and written files are checked alike.
     const StageType& giver = *specs[from->node].node.type;
     StageSpec spec;
     spec.node.name = fmt::format("tap:{}.{}", specs[from->node].node.name, giver.outputs[from->port].name);

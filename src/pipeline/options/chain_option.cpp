@@ -41,6 +41,8 @@ void ChainOption::check(const CheckContext& context, const std::string& path,
 
   if (auto fit = chain_.ready(); !fit)
     problems.push_back({value_.mark, path + ".filters", fit.error().message});
+
+  // With all options spelt out, config.yaml repeats the run without the file of the filters.
   const core::ConfigMark mark = value_.mark;
   auto spelt_out = core::parse_yaml(chain_.to_yaml(), "");
   const ConfigNode* list = spelt_out ? spelt_out->find("filters") : nullptr;

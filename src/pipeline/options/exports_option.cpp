@@ -41,6 +41,7 @@ void ExportsOption::add(const core::ConfigNode& entry, const std::string& path,
   }
   if (problems.size() != before) return;
 
+  // An option that was set must belong to the format; defaults need not, so they are not listed.
   for (std::size_t i = own; i < table.specs().size(); ++i) {
     if (entry.find(table.specs()[i].key) != nullptr) request.given.insert(table.specs()[i].key);
   }
@@ -49,6 +50,7 @@ void ExportsOption::add(const core::ConfigNode& entry, const std::string& path,
   request.format = words.format;
   request.content = content_of(words.what);
 
+  // Exports are part of the result, which appears whole or not at all: none may lie outside of its folder.
   if (words.file.empty() || leaves_folder(request.output)) {
     problems.push_back(
         {entry.mark, path, "an export names a file below the result folder, such as grid.yaml"});

@@ -57,6 +57,8 @@ fs::path inside(const fs::path& folder, const fs::path& path) {
 core::Result<DebugFolder> DebugFolder::prepare(const fs::path& folder, const fs::path& out,
                                                const fs::path& out_path, bool replace) {
   DebugFolder result;
+
+  // A folder of debug pictures is replaced as a whole by the next run, so it must not hold a result.
   if (!inside(folder, out).empty()) {
     return core::usage_error(
         fmt::format("{}: holds the result folder {}; debug pictures need a folder of their own",
@@ -73,6 +75,7 @@ core::Result<DebugFolder> DebugFolder::prepare(const fs::path& folder, const fs:
     return result;
   }
 
+  // Inside the result the pictures are written to its temporary folder and appear together with it.
   result.path_ = out_path / relative;
   result.within_ = relative;
   if (auto made = core::make_folder(result.path_); !made) return tl::unexpected(made.error());

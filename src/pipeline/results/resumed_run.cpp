@@ -168,11 +168,15 @@ core::Result<std::optional<ResumedRun>> open_resumed(const fs::path& folder, con
 
   auto maps = reader->load_each();
   if (!maps) return tl::unexpected(maps.error());
+
+  // A run that was killed before its first keyframe left nothing to continue from.
   if (maps->size() == 1 && maps->front().map.keyframe_count() == 0) {
     remove_store(run.store);
     return std::nullopt;
   }
 
+  // Only the same recording, cameras and options continue the map as the interrupted run would have done; a
+  // mixture of two could not be made by any single run.
   const maps::StoreHeader& header = reader->header();
   if (auto same = check_same(run.store, "recording", header.input, input); !same)
     return tl::unexpected(same.error());

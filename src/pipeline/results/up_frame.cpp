@@ -29,6 +29,8 @@ std::optional<double> wall_angle(const cloud::Cloud& cloud, const Eigen::Matrix3
     return static_cast<int>((turn - std::floor(turn)) * kBins) % kBins;
   };
 
+  // Walls of a room meet at right angles, so directions are compared modulo a quarter turn. Four times the
+  // angle makes that a full turn, in which the mean has no jump at the ends.
   std::array<double, kBins> weight{};
   std::array<Eigen::Vector2d, kBins> sum;
   sum.fill(Eigen::Vector2d::Zero());
@@ -44,6 +46,7 @@ std::optional<double> wall_angle(const cloud::Cloud& cloud, const Eigen::Matrix3
     all += 1.0;
   }
 
+  // Neighbouring bins count together, as noise of the normals spreads one wall over several of them.
   const auto near = [&](const auto& of, int middle) {
     auto result = of[static_cast<std::size_t>(middle)];
     for (int k = 1; k <= kNear; ++k) {
@@ -58,6 +61,7 @@ std::optional<double> wall_angle(const cloud::Cloud& cloud, const Eigen::Matrix3
     if (near(weight, b) > near(weight, best)) best = b;
   }
 
+  // Without a dominant direction, a turn by the strongest bin would be arbitrary.
   if (all == 0.0 || near(weight, best) < kLeastShare * all) return std::nullopt;
   const Eigen::Vector2d mean = near(sum, best);
   return std::atan2(mean.y(), mean.x()) / 4.0;
@@ -71,6 +75,8 @@ UpFrame find_up(Up wanted, Yaw yaw, const cloud::CloudConstPtr& cloud,
   if (wanted == Up::kNone || trajectory.empty()) return frame;
 
   const geometry::Rigid3& first = trajectory.front().world_from_camera;
+
+  // The y axis of a camera points down: until a floor is found, up is -y of the first camera.
   Eigen::Vector3d up = -first.rotation.col(1);
   double ground = up.dot(first.translation);
   frame.up = "camera";
@@ -83,6 +89,7 @@ UpFrame find_up(Up wanted, Yaw yaw, const cloud::CloudConstPtr& cloud,
     }
   }
 
+  // A camera that looks straight up or down has no heading; the vertical axis of its image stands in.
   Eigen::Vector3d ahead = first.rotation.col(2) - first.rotation.col(2).dot(up) * up;
   if (ahead.norm() < 0.1) ahead = first.rotation.col(1) - first.rotation.col(1).dot(up) * up;
   Eigen::Matrix3d axes;  // of the output in the map
@@ -93,6 +100,8 @@ UpFrame find_up(Up wanted, Yaw yaw, const cloud::CloudConstPtr& cloud,
   const auto walls = yaw == Yaw::kWalls && cloud != nullptr ? wall_angle(*cloud, axes) : std::nullopt;
   frame.yaw = walls ? "walls" : "camera";
   if (walls) axes *= Eigen::AngleAxisd(*walls, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+
+  // The origin is the first camera or, with a floor, the point of the floor below it.
   const Eigen::Vector3d origin = first.translation + (ground - up.dot(first.translation)) * up;
   frame.output_from_map = geometry::Rigid3(axes, origin).inverse();
   return frame;

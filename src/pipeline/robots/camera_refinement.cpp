@@ -75,16 +75,20 @@ Json pair_of(const RobotInfo& a, const RobotInfo& b) {
     return pair;
   }
 
+  // A change states the readout of the second camera itself, all other numbers relative to the first one.
   optimize::CameraChange difference = optimize::change_between(a.estimate->found, b.estimate->found);
   difference[optimize::kReadout] -= a.estimate->found.readout_s.value_or(0.0);
   const optimize::CameraCovariance both = a.estimate->covariance + b.estimate->covariance;
   const optimize::CameraChange sigma = both.diagonal().cwiseSqrt();
   const optimize::CameraChange sigmas = difference.cwiseQuotient(sigma);
 
+  // The numbers are correlated and differ in size by orders of magnitude; in units of their standard
+  // deviations the system is well conditioned.
   const optimize::CameraCovariance correlation =
       sigma.cwiseInverse().asDiagonal() * both * sigma.cwiseInverse().asDiagonal();
   const double chi2 = sigmas.dot(correlation.ldlt().solve(sigmas));
 
+  // The test of all numbers says only that the cameras differ; the one that differs most is named.
   Eigen::Index number = 0;
   const double largest = sigmas.cwiseAbs().maxCoeff(&number);
   const char* name = kNames.at(static_cast<std::size_t>(number));
@@ -114,6 +118,8 @@ Json camera_section(const RobotInfo& robot) {
                        {"used", f.used}});
   }
 
+  // Numbers that were found but not used are listed as well: their standard deviations show how well the
+  // recording determines the camera.
   return {{"robot", robot.name},
           {"gain", rounded(known.gain)},
           {"numbers", numbers},

@@ -33,6 +33,8 @@ viz::Scene scene_of(const mapping::FusedMap& preview, const std::vector<std::str
     scene.scalars.push_back(static_cast<float>(robot));
   };
 
+  // Surface samples are stored in the frame of their keyframe and follow its pose in the preview; landmarks
+  // are in the world already.
   for (const KeyframeId id : preview.map.keyframe_ids()) {
     const Rigid3 world_from_camera = preview.map.camera_from_world(id).inverse();
     for (const maps::SurfaceSample& sample : preview.map.keyframe(id).surface) {
@@ -67,6 +69,7 @@ std::string text_of(const Meeting& meeting, const MeetingEvent& event,
                       {"frame_from_robot", rows(event.preview->anchor_from_part[i])}});
   }
 
+  // The merge is a preview whose own times are not known (-1); the time of the meeting stands beside it.
   Json json = {
       {"number", meeting.number},
       {"preview", true},
@@ -93,6 +96,8 @@ core::Result<void> MeetingLog::note(const MeetingEvent& event, const std::vector
   const std::string keyframe = fmt::format("keyframe {} of {}", event.keyframe.index,
                                            names[static_cast<std::size_t>(event.keyframe.robot)]);
 
+  // Places that look similar are often different ones: users are informed of meetings only, and the steps
+  // before are for debugging.
   switch (event.step) {
     case MeetingStep::kNone:
       return {};
@@ -115,6 +120,7 @@ core::Result<void> MeetingLog::note(const MeetingEvent& event, const std::vector
                       1e3 * event.evidence.alignment.spread_m, event.preview->parts.size()));
       return write(event, names, when);
 
+    // Files of the meeting have been written and announced, so its end is listed too.
     case MeetingStep::kTakenBack:
       meetings_.push_back({static_cast<int>(meetings_.size()) + 1, a, b, time_s, event.frame, true});
       log_->warning(

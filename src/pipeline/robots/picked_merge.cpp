@@ -26,6 +26,8 @@ core::Result<Rigid3> laid_by_picks(const Places& places) {
   constexpr double kPick_m = 0.01;      // standard deviation of a pick
   constexpr double kSquare_rad = 0.01;  // and of walls that are square
   constexpr double kGate_m = 0.1;
+
+  // Both maps are upright, so they differ by a shift and a turn about z; the centroids determine the shift.
   const auto count = static_cast<double>(places[0].size());
   Eigen::Vector3d a = Eigen::Vector3d::Zero(), b = Eigen::Vector3d::Zero();
 
@@ -34,6 +36,7 @@ core::Result<Rigid3> laid_by_picks(const Places& places) {
     b += places[1][i] / count;
   }
 
+  // With positions as complex numbers, seen from above, the angle of this sum is the least-squares turn.
   std::complex<double> sum(0.0, 0.0);
   double spread = 0.0;
   for (std::size_t i = 0; i < places[0].size(); ++i) {
@@ -42,12 +45,15 @@ core::Result<Rigid3> laid_by_picks(const Places& places) {
     spread += q.head<2>().squaredNorm();
   }
 
+  // Two picks 20 cm apart have a spread of 2 * 0.1^2 m^2; nearer ones leave the turn open.
   if (spread < 0.02) {
     return core::usage_error(
         "--pick: two picks must lie at least 20 cm from each other, as seen from above; pick both jambs of a "
         "door");
   }
 
+  // Both frames are along walls, so the turn is probably a multiple of 90 degrees: within three standard
+  // deviations of one, picks and walls are averaged, weighted by their variances.
   double turn = std::arg(sum);
   const double off = std::remainder(turn, M_PI / 2);
   const double variance = 2.0 * kPick_m * kPick_m / spread;
@@ -90,6 +96,7 @@ core::Result<mapping::MergeEvidence> picked_merge(const maps::StoredMaps& maps,
   const auto laid = laid_by_picks(places);
   if (!laid) return tl::unexpected(laid.error());
 
+  // The maps are tied together by keyframes that saw the picked places, so each needs a surface there.
   std::array<std::vector<adjust::PlaceViews>, 2> seen;
   std::array<const maps::StoredMap*, 2> stored{};
   for (std::size_t p = 0; p < 2; ++p) {
@@ -111,6 +118,8 @@ core::Result<mapping::MergeEvidence> picked_merge(const maps::StoredMaps& maps,
   merge.accepted = true;
   merge.a = main_part(*stored[0], parts);
   merge.b = main_part(*stored[1], parts);
+
+  // Evidence has the earlier component as a, whichever map the picks name first.
   const bool swapped = merge.b < merge.a;
   const std::size_t first = swapped ? 1 : 0;
   if (swapped) std::swap(merge.a, merge.b);
@@ -118,6 +127,7 @@ core::Result<mapping::MergeEvidence> picked_merge(const maps::StoredMaps& maps,
       stored[0]->result.output_from_map.inverse() * *laid * stored[1]->result.output_from_map;
   merge.alignment.a_from_b = swapped ? first_from_second.inverse() : first_from_second;
 
+  // Each pick is a constraint between keyframes of both maps, good to 1 cm and 0.01 rad.
   merge.alignment.covariance = geometry::information_of(0.01, 0.01).inverse();
   for (std::size_t i = 0; i < places[0].size(); ++i) {
     mapping::VerifiedPair& pair = merge.pairs.emplace_back();

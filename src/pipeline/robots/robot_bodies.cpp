@@ -92,11 +92,15 @@ void RobotBodies::bridge(Slams& slams, std::vector<FrameRow>& rows) {
 
     std::set<std::size_t> numbers;
 
+    // Components have no known relative pose, so a gap is bridged only within one of them.
     for (const core::KeyframeId component : components_in(slam)) {
       std::vector<inertial::PathFrame> path = path_of(slam, component);
       if (!body.up) body.up = inertial::felt_up(body.motion.rates(), *body.motion.gyro(), path);
       for (const std::size_t i : inertial::bridge(body.motion.rates(), *body.motion.gyro(), path)) {
         maps::FramePose& frame = frames[i];
+
+        // Relative to the same keyframe as the frame before, a bridged pose follows later adjustments of the
+        // map.
         frame.reference = frames[i - 1].reference;
         frame.camera_from_reference =
             *path[i].camera_from_world * slam.map().camera_from_world(frame.reference).inverse();
@@ -154,6 +158,8 @@ void RobotBodies::report(Json& summary) const {
   }
 
   if (!summary.contains("sensors")) return;
+
+  // While tracking, bridged frames were counted as lost; their poses came afterwards.
   FrameCounts frames(summary);
   frames.bridged = bridged_;
   frames.lost -= bridged_;

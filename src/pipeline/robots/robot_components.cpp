@@ -24,6 +24,8 @@ RobotComponents components_of(const RobotMap& whole) {
   for (const core::KeyframeId root : roots) {
     auto map = std::make_shared<maps::Map>(maps::component(*whole.map, root));
     std::vector<maps::FramePose> frames = maps::frames_in(*map, whole.frame_poses);
+
+    // A few keyframes apart from the rest are mostly a failed start. The main component stays however small.
     if (root != main && map->keyframe_count() < kLeastKeyframes) {
       ++result.dropped;
       result.dropped_frames += static_cast<std::size_t>(
@@ -36,6 +38,7 @@ RobotComponents components_of(const RobotMap& whole) {
                            std::move(map), std::move(frames), true});
   }
 
+  // A component that remains alone is the map of its robot.
   if (result.maps.size() == 1) result.maps.front().component = false;
   return result;
 }
@@ -82,6 +85,8 @@ void doubt_components_apart(const Json& summary, std::vector<Doubt>& reasons) {
   }
   if (apart == 0) return;
 
+  // The number of keyframes depends on the motion; the share of frames shows how much of the recording the
+  // first map lacks.
   const FrameCounts all(summary);
   const auto read = static_cast<double>(all.read + all.unreadable);
   const double percent = read > 0.0 ? 100.0 * frames / read : 0.0;

@@ -192,11 +192,13 @@ Json section_of(const RobotMerge& merge) {
                 {"span_rad", rounded(e.consistency.span_rad)},
                 {"spread_m", rounded(e.alignment.spread_m)}};
 
+  // A second alignment that fits nearly as well shows how ambiguous the place is.
   if (e.ambiguity.alternative_m > 0.0) {
     entry["alternative_m"] = rounded(e.ambiguity.alternative_m);
     entry["alternative_overlay"] = overlay_section(e.ambiguity.alternative_overlap);
   }
 
+  // A refused merge has no relative pose; a negative time is not known, or the merge came after mapping.
   if (e.accepted) add_alignment(e.alignment, entry);
   if (merge.by_rig) entry["by"] = "rig";
   if (merge.time_s >= 0.0) entry["time_s"] = rounded(merge.time_s);
@@ -211,12 +213,17 @@ MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor
   mapping::OverlapFinder places = mapping::learn_places(maps, options);
   std::vector<mapping::MergeEvidence> evidence =
       mapping::find_overlaps(maps, places.look_at_all(maps, executor), options, executor);
+
+  // Merges that are known from elsewhere replace the comparison of their maps, which may have been refused
+  // for too little overlap.
   const auto by_rig = put_in(known, parts, evidence, log);
   if (anchor >= parts.size()) {
     anchor = largest_group(parts, mapping::connected_parts(parts.size(), evidence));
   }
 
   mapping::FusedMap fused = mapping::fuse_maps(maps, evidence, anchor, options);
+
+  // Evidence is reported after the fusion, whose pose graph may have rejected a merge that was accepted.
   MergedRobots result;
   for (mapping::MergeEvidence& merge : evidence) {
     const std::string& a = parts[merge.a].name;
@@ -230,6 +237,7 @@ MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor
   auto map = std::make_shared<MapResult>();
   map->map = std::make_shared<maps::Map>(std::move(fused.map));
 
+  // Components of one robot are parts of their own; the robot is listed once.
   std::vector<const RobotMap*> used;
   for (const std::size_t p : fused.parts) {
     used.push_back(&parts[p]);
@@ -261,10 +269,13 @@ std::shared_ptr<MapResult> kept_map(const std::vector<RobotMap>& parts, const ma
   take_poses_from_map(*kept);
   kept->apart = components_apart(parts, {0});
 
+  // Poses are not estimated again, so their accuracy is that of the run that made the map.
   if (state.covariances.empty()) {
     kept->accuracy.missing = "the map was made without refine";
     return kept;
   }
+
+  // The lists of keyframes and of their accuracies correspond: NaN stands for a covariance that is not known.
   for (const maps::KeyframePose& keyframe : kept->keyframes) {
     const auto known = state.covariances.find({keyframe.id.robot, keyframe.stamp});
     mapping::KeyframeAccuracy& accuracy = kept->accuracy.keyframes.emplace_back();

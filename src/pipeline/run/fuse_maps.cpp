@@ -114,6 +114,8 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
   if (auto picked = set_picks(request, **maps); !picked) return tl::unexpected(picked.error());
   const auto rig = rig_of(request, **maps);
   if (!rig) return tl::unexpected(rig.error());
+
+  // A change, such as a scale from control points, comes first: if it fails, no output folder is touched.
   std::map<std::string, std::string> files;
   if (request.change) {
     auto changed = request.change(**maps);
@@ -128,6 +130,8 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
   context.log = &log;
   context.stop = stop;
   if (*rig) context.input.rig = &**rig;
+
+  // The folder notes the files that it will hold, so that replacing it later removes these and nothing else.
   if (auto ok = announce_files(*graph, {}, *output); !ok) return tl::unexpected(ok.error());
   if (auto ok = core::write_file(output->path() / "config.yaml", context.store.configuration); !ok)
     return tl::unexpected(ok.error());

@@ -78,12 +78,17 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_input(const std::string
                                                                const core::Executor& executor,
                                                                core::Log& log) {
   if (dataset::is_live_address(input)) return open_live_input(input, options, log);
-  if (!options.live.record.empty() || options.live.for_s < kForever_s) {
-    return core::usage_error(
-        fmt::format("{}: is a recording; --record and --for are for live cameras (ros2://DOMAIN)", input));
+
+  // Options without effect are refused: silence would suggest that they were obeyed.
+  if (!options.live.record.empty() || options.live.for_s < kForever_s ||
+      options.live.most_waiting_bytes != dataset::kMostWaitingBytes) {
+    return core::usage_error(fmt::format(
+        "{}: is a recording; --record, --for and --max-memory are for live cameras (ros2://DOMAIN)", input));
   }
 
   if (!synth::is_synth_url(input)) return dataset::open_recording(input, options, log);
+
+  // A generated world is rendered with its own camera; another one would contradict its images.
   if (!options.camera.empty()) {
     return core::usage_error(
         fmt::format("{}: has its own camera, which '{}' cannot replace; write the world to a folder "
@@ -91,6 +96,7 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_input(const std::string
                     input, options.camera));
   }
 
+  // Recordings select their frames when they are opened, generated worlds do not.
   auto source = synth::open_synth(input, scenes_folder, executor, log);
   if (!source) return source;
   return select_frames(std::move(*source), options);

@@ -61,6 +61,8 @@ std::string config_text(const MapRequest& request, const Graph& graph, int threa
     text += fmt::format("  into: {}\n  contents_of_map: {}\n", quoted(request.into.string()),
                         request.into_contents);
   }
+
+  // Relative paths of recordings are of use only together with the folder in which the program was run.
   if (const std::string folder = folder_from_result(request); !folder.empty()) {
     text += fmt::format("  folder: {}  # in which the program was run, seen from this one\n", quoted(folder));
   }
@@ -91,6 +93,8 @@ std::string config_text(const MapRequest& request, const Graph& graph, int threa
   if (request.open.poses == dataset::PoseUse::kIgnore) text += "  poses: ignore\n";
   // A run that ended because the rig could not be found is continued with more in rig.yaml.
   if (threads > 0 && !request.rig.empty()) text += fmt::format("  rig: {}\n", quoted(request.rig.string()));
+
+  // The number of threads does not change a result, so a resumed run may have another one.
   if (threads > 0) text += fmt::format("  threads: {}\n", threads);
   return text + to_yaml(graph);
 }
@@ -123,6 +127,7 @@ core::Result<MapRequest> in_order(MapRequest request) {
     std::string given;
   };
 
+  // The order of the recordings numbers the robots: sorted, the same recordings always give the same map.
   std::vector<Input> inputs;
   request.others.push_back(request.input);
   for (const std::string& given : request.others) {
@@ -136,6 +141,7 @@ core::Result<MapRequest> in_order(MapRequest request) {
     return std::tie(a.name, a.folder, a.given) < std::tie(b.name, b.folder, b.given);
   });
 
+  // A recording given twice would be two robots on one path, which agree everywhere and prove nothing.
   const auto place = [](const Input& input) {
     return std::filesystem::absolute(input.given).lexically_normal();
   };
@@ -161,6 +167,8 @@ core::Result<std::unique_ptr<RobotRecordings>> open_inputs(const MapRequest& req
   std::vector<std::string> inputs{request.input};
   inputs.insert(inputs.end(), request.others.begin(), request.others.end());
 
+  // Frames of several robots are put in order by their stamps before the run; those of a live camera are not
+  // known then.
   for (const std::string& input : inputs) {
     if (inputs.size() > 1 && dataset::is_live_address(input)) {
       return core::usage_error(fmt::format(
@@ -201,6 +209,7 @@ core::Result<void> fits(const Graph& graph, const MapRequest& request) {
                     graph.file.string()));
   }
 
+  // The stage and the map belong together: one without the other is a mistake in the command.
   if (any_stage(graph, &Stage::knows_map) != !request.known_map.empty()) {
     return core::usage_error(fmt::format(
         request.known_map.empty() ? "{}: locates a camera in a map; it is run by plumbline localize"
@@ -309,6 +318,8 @@ class MapRun {
                                RunClock::time_point began) {
     if (auto prepared = prepare(); !prepared) return tl::unexpected(prepared.error());
     RunContext context = context_of(stop);
+
+    // The cameras are written before the first frame, so that a run that is killed can be examined too.
     std::vector<sensor::Camera> cameras;
     for (const RobotInfo& robot : source_->robots()) cameras.push_back(robot.camera);
     if (auto ok = write_cameras(output_->path(), source_->robots(), cameras); !ok)
@@ -318,9 +329,13 @@ class MapRun {
     if (live != nullptr) live->keep_in(output_->path());
     if (request_.prepared) request_.prepared(output_->path());
     const auto report = run_graph(graph_, context, progress, request_.pace_hz);
+
+    // A live run that its user gave up keeps nothing; after other failures the stored keyframes can be
+    // resumed.
     if (!report && live != nullptr && live->given_up()) return tl::unexpected(report.error());
     if (!report) return tl::unexpected(with_what_is_kept(report.error(), *output_));
 
+    // A failure to record the live camera must not cost the map: it is reported after the result is written.
     const auto recorded = live != nullptr ? live->finish() : core::Result<void>();
 
     std::string input = request_.input;
@@ -353,6 +368,7 @@ class MapRun {
       report_resumed(output_->path(), resumed_, log_);
     }
 
+    // A resumed run was found to have the same configuration, so its config.yaml may be replaced.
     const std::string config = config_text(request_, graph_, executor_.threads());
     if (auto written = core::write_file(output_->path() / "config.yaml", config); !written) return written;
     if (request_.debug_video.empty()) return announce_files(graph_, {}, *output_);

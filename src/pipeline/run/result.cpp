@@ -73,6 +73,8 @@ core::Result<void> write_exports(const std::filesystem::path& folder, const Grap
         if (auto made = core::make_folder(wanted.output.parent_path()); !made) return made;
       }
 
+      // An export that does not suit this map is left out with a warning; a file that cannot be written, for
+      // want of space for instance, ends the run.
       const auto summary = exports::write_export(wanted, *context.executor, *context.log, nullptr);
       if (!summary && summary.error().kind == core::ErrorKind::kOutput)
         return tl::unexpected(summary.error());

@@ -23,6 +23,7 @@ RobotRecordings::RobotRecordings(std::vector<std::unique_ptr<dataset::FrameSourc
   if (recordings_.size() > 1 && live_ != nullptr)
     throw std::invalid_argument("RobotRecordings: one of several is live");
 
+  // Robots' names become folders of the result, so equal names get a number.
   std::set<std::string> taken;
   double latest_start = std::numeric_limits<double>::lowest();
   double earliest_start = std::numeric_limits<double>::max();
@@ -47,6 +48,8 @@ RobotRecordings::RobotRecordings(std::vector<std::unique_ptr<dataset::FrameSourc
   }
   if (live_ != nullptr) return;
 
+  // Recordings that overlap in time were made together and keep their offsets; all others are treated as if
+  // they had begun at the same moment.
   const bool together = latest_start <= earliest_end;
   for (const RobotInfo& robot : robots_) {
     const dataset::FrameSource& recording = *recordings_[static_cast<std::size_t>(robot.number)];
@@ -56,6 +59,7 @@ RobotRecordings::RobotRecordings(std::vector<std::unique_ptr<dataset::FrameSourc
     }
   }
 
+  // Equal times are ordered by robot and index, so that every run sees the same order of frames.
   std::sort(order_.begin(), order_.end(), [](const Place& a, const Place& b) {
     return std::tie(a.time, a.robot, a.index) < std::tie(b.time, b.robot, b.index);
   });

@@ -204,6 +204,8 @@ class Runner {
     StageIo io(tick.frame, type.inputs, type.outputs);
     tick.outputs[n].resize(type.outputs.size());
 
+    // A stage runs only on complete inputs: an earlier one that skips a frame makes the later ones skip it.
+    // Stages without inputs per frame work at the end.
     bool takes_frames = type.is_source();
     for (std::size_t i = 0; i < type.inputs.size(); ++i) {
       if (type.inputs[i].type.rate != Rate::kFrame || !node.inputs[i]) continue;
@@ -310,6 +312,9 @@ class Runner {
     }
 
     const auto start = Clock::now();
+
+    // A required input without a value is an error of the program; thrown inside the guard, it names the
+    // stage.
     auto finished = guarded(node.name, [&]() -> core::Result<void> {
       for (std::size_t i = 0; i < node.inputs.size(); ++i) {
         const Port& port = node.type->inputs[i];

@@ -54,6 +54,7 @@ Json timing_of(const Graph& graph, const RunReport& report, const RunFacts& fact
                           {"finish", rounded(stage.finish_ms)}};
   }
 
+  // Parts of stages, such as local bundles, run in some frames only, so their number is given too.
   Json parts = Json::object();
   for (const StageTiming& part : parts_of(graph)) {
     const auto times =
@@ -121,6 +122,8 @@ std::string text_of(const Needs& needs) {
 std::string text_of(const Json& summary, const Needs& needs) {
   const FrameCounts frames(summary);
   const auto count = [](const Json& number) { return number.get<std::size_t>(); };
+
+  // The verdict comes first: numbers of a map that must not be trusted mislead.
   std::string text = sentence_of(summary);
   if (!text.empty()) text += "\n";
 
@@ -140,6 +143,7 @@ std::string text_of(const Json& summary, const Needs& needs) {
   if (summary.contains("sensors")) text += sensors_text(summary);
   if (summary.contains("live")) text += fmt::format("live       {}\n", live_text(summary.at("live")));
 
+  // Locating leaves the map as it is, so the map's size is not a result of the run.
   if (summary.contains("localized")) {
     const Json& localized = summary.at("localized");
     return text +
@@ -204,6 +208,7 @@ core::Result<void> write_timing(const std::filesystem::path& file, const Graph& 
   for (const StageTiming* column : columns) text += "," + core::csv_field(column->name + "_ms");
   text += ",rss_mb\n";
 
+  // An empty cell is a frame in which the stage had nothing to do, or one that an earlier run has done.
   for (std::size_t f = 0; f < report.frames; ++f) {
     text += fmt::format("{},{:.6f}", f, source.info(f).stamp);
     for (const StageTiming* column : columns) {

@@ -29,6 +29,7 @@ namespace plumbline::pipeline {
 namespace {
 
 void remove(const std::set<RevisedClouds::View>& left_out, maps::StoredViews& views) {
+  // A copy keeps what all views have in common; only the lists with an entry for each view are filled again.
   maps::StoredViews kept = views;
   kept.keyframes.clear();
   kept.frames.clear();
@@ -139,6 +140,8 @@ class FuseStage : public Stage {
     auto fused = fuse(map, *views);
     if (!fused) return tl::unexpected(fused.error());
 
+    // The frame of the results comes before the filters: these may cut the floor away, and their boxes are
+    // meant in that frame.
     auto dense = std::make_shared<DenseCloud>();
     dense->voxel_m = options_.voxels.voxel_m;
     report.frame = frame_of(map, fused->cloud);
@@ -147,6 +150,7 @@ class FuseStage : public Stage {
     dense->state = state_;
     if (dense->upright) cloud::transform(*fused->cloud, report.frame.output_from_map);
 
+    // Only the main map has no name; clouds of components apart have no known pose in its frame.
     if (keyframe_clouds_ && map.name.empty()) {
       const auto up = dense->upright ? cloud::Up::kZ : cloud::Up::kMinusY;
       const auto written = maps::write_keyframe_clouds(context_->output_folder / "keyframes", *views,
@@ -194,6 +198,8 @@ class FuseStage : public Stage {
         views.robots.push_back(static_cast<std::uint8_t>(std::clamp(robot, 0, kMostRobots)));
     }
 
+    // The accuracy of a point follows from that of the keyframes that saw it. It is kept in the store, so
+    // that a later fusion has it too.
     const std::vector<mapping::KeyframeAccuracy>& accuracy = map.accuracy.keyframes;
     for (std::size_t i = 0; i < accuracy.size(); ++i) {
       const maps::KeyframePose& keyframe = map.keyframes[i];

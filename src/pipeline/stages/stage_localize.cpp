@@ -66,6 +66,7 @@ class LocalizeStage : public Stage {
   }
 
   void report(Json& summary) const override {
+    // The map is not changed: these sections would describe an empty one.
     for (const char* of_maps :
          {"keyframes", "keyframe_causes", "landmarks", "loops", "refine", "path", "merges", "meetings",
           "robots", "components", "cloud", "frame", "camera", "camera_pairs"})
@@ -101,6 +102,8 @@ class LocalizeStage : public Stage {
   /// Keeps the outcome of a frame, and shows it to the observer.
   void note(const localize::LocatedFrame& located) {
     const std::string text = fmt::format("{:.6f},{}", located.stamp, located.how);
+
+    // A frame that is not located has a row too, with the reason, so that gaps can be explained.
     if (!located.located) {
       longest_gap_ = std::max(longest_gap_, ++gap_);
       last_reason_ = located.reason;

@@ -129,6 +129,7 @@ class MergeStage : public Stage {
       if (auto finished = live_->finish(pictures_); !finished) return finished;
     }
 
+    // A single robot's map has nothing to be compared with, and a map that was only adjusted keeps its poses.
     if (maps->maps.size() == 1 && maps->maps.front().robots.size() == 1 &&
         context_->input.stored_maps == nullptr) {
       merged_.map = std::make_shared<MapResult>();
@@ -202,6 +203,7 @@ class MergeStage : public Stage {
       component.joined = std::none_of(apart.begin(), apart.end(),
                                       [&](const auto& other) { return other->name == part.name; });
 
+      // Each comparison with another map may have failed for a reason of its own, so all are listed.
       for (const RobotMerge& merge : merged_.merges) {
         if (merge.a != part.name && merge.b != part.name) continue;
         component.agreeing = std::max(component.agreeing, merge.evidence.consistency.agreeing);

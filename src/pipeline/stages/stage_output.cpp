@@ -89,6 +89,7 @@ class OutputStage : public Stage {
     if (given->map != nullptr) path_ = maps::check_path(given->frame_poses, *given->map);
     if (context_->hooks.observer != nullptr) tell_observer(*given, *dense);
 
+    // The observer followed the run in the frame of the map; files are in the frame of the results.
     const MapResult map = moved(*given, dense->output_from_map);
     const std::filesystem::path& folder = context_->output_folder;
     const cloud::CloudColumns& columns = dense->columns;
@@ -109,6 +110,8 @@ class OutputStage : public Stage {
         [&] { return write_components(*given, *dense); },
     };
 
+    // Files are written while this thread draws the pictures. The error that is reported is the first one in
+    // the list, not the first in time.
     std::vector<core::Result<void>> written(steps.size());
     std::vector<core::Executor::Job> jobs;
     for (std::size_t i = 0; i < steps.size(); ++i)
@@ -177,6 +180,7 @@ class OutputStage : public Stage {
       const std::filesystem::path folder = context_->output_folder / "components" / map.name;
       if (auto made = core::make_folder(folder); !made) return made;
 
+      // Components get the basic files only: other clouds, tables and pictures are of the main map.
       if (ply_) {
         if (auto written = cloud::write_ply(folder / "map.ply", *own.cloud, own.columns); !written)
           return written;
@@ -274,6 +278,7 @@ class OutputStage : public Stage {
     scene.cloud = dense.cloud;
     scene.title = context_->input.source != nullptr ? context_->input.source->name() : "fused maps";
 
+    // The paths of several robots need names and colours, which add_robots() gives them.
     if (map.robots.size() < 2) {
       viz::CameraPath path;
       path.trajectory = map.trajectory;
@@ -286,6 +291,7 @@ class OutputStage : public Stage {
       snapshots.push_back({picture_options(view, color, dense), folder / (name + ".png")});
     };
 
+    // Colours by robot show which part of a merged map each robot has seen.
     for (const viz::View view : chosen_) {
       if (map.robots.size() > 1 && !dense.columns.robot.empty())
         add("robots_" + viz::view_name(view), view, viz::ColorMode::kRobot);

@@ -38,6 +38,7 @@ class PosesStage : public Stage {
     recordings_ = context.input.recordings;
     ways_.resize(recordings_->robots().size());
 
+    // One file for several recordings would give all robots the same path.
     if (several() && !file_.empty() && file_.find(kRobot) == std::string::npos) {
       return core::usage_error(fmt::format(
           "{}: are poses of one recording; write {} where the file's name has the robot's: poses/{}.txt",
@@ -48,6 +49,8 @@ class PosesStage : public Stage {
       if (!poses) return tl::unexpected(poses.error());
       if (auto near = near_origin(file_of(robot), *poses); !near) return near;
 
+      // The distance from the origin is checked before the convention is applied, so that the message shows
+      // the numbers of the file.
       for (geometry::StampedPose& pose : *poses)
         pose.world_from_camera = geometry::read_by(are_, pose.world_from_camera);
       Way& way = ways_[static_cast<std::size_t>(robot.number)];
@@ -68,6 +71,8 @@ class PosesStage : public Stage {
     const std::optional<geometry::Rigid3> pose = geometry::pose_at(way.poses, frame->stamp, max_gap_s_);
     const std::string stamp =
         fmt::format("{}{:.6f}", several() ? core::csv_field(robot.name) + "," : "", frame->stamp);
+
+    // Depth of a frame without a pose near its stamp would be fused at a guess: the frame counts as lost.
     if (!pose) {
       map_.frames.push_back({io.frame(), FrameState::kLost, stamp + ","});
       return {};
@@ -81,6 +86,7 @@ class PosesStage : public Stage {
     map_.trajectory.push_back({frame->stamp, *pose});
     map_.trajectory_ids.push_back(tracked->frame);
 
+    // Keyframes are chosen by motion alone, as no tracker tells how much of a view is known.
     if (way.keyframes == 0 || is_new_view(way.last, *pose)) {
       tracked->keyframe = {robot.number, way.keyframes++};
       way.last = *pose;

@@ -42,6 +42,7 @@ class ReadStage : public Stage {
     if (source_ == nullptr || (source_->size() == 0 && !live))
       return core::input_error("the recording has no frames");
 
+    // Samples of the frames are searched at the end for common mistakes, such as depth along the ray.
     if (recordings_ != nullptr) {
       for (const RobotInfo& robot : recordings_->robots()) {
         const std::size_t frames = live ? 0 : recordings_->frames_of(robot.number);
@@ -49,6 +50,7 @@ class ReadStage : public Stage {
       }
     }
 
+    // Frames that the interrupted run has done are not read again, but count in the totals.
     if (context.resumed != nullptr) {
       resumed_ = context.resumed->rows.size();
       read_ = resumed_;
@@ -64,6 +66,8 @@ class ReadStage : public Stage {
     auto frame = source_->read(io.frame());
     if (!frame && frame.error().kind == core::ErrorKind::kOutput) return tl::unexpected(frame.error());
     if (!frame) {
+      // A damaged recording may have thousands of such frames; after the first few only their number is
+      // reported.
       const std::size_t reported = unreadable_++;
       const std::string text = fmt::format("frame {} is skipped: {}", io.frame(), frame.error().message);
 

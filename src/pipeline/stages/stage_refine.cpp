@@ -66,6 +66,7 @@ class RefineStage : public Stage {
       rotation.push_back(keyframe.sigma_rotation_rad());
     }
 
+    // Stages before this one have counted the adjustments that they refused; the path has the sum of all.
     add(summary["path"]["refused_adjustments"], summary_.refused);
 
     summary["refine"] = {{"local_maps", summary_.local_maps},

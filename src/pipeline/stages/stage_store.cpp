@@ -70,6 +70,8 @@ class StoreStage : public Stage {
     const auto track = io.input<TrackedFrame>("track");
     const auto cloud = io.input<KeyframeCloud>("cloud");
 
+    // Clouds of a map that is visited again are written at the end, when it is known which of their points
+    // are gone.
     std::vector<maps::StoreCloud> clouds;
     if (cloud != nullptr && !context_->input.into && (cloud->id.valid() || cloud->frame.valid())) {
       auto waiting = store_cloud_of(*cloud);
@@ -77,6 +79,8 @@ class StoreStage : public Stage {
       clouds.push_back(std::move(*waiting));
     }
 
+    // Frames wait for the next keyframe, so that the store of an interrupted run ends with a keyframe and can
+    // be continued there.
     if (track != nullptr) {
       maps::StoreStep& step = steps_[track->robot];
       step.robot = track->robot;
@@ -96,6 +100,7 @@ class StoreStage : public Stage {
     const auto map = io.input<MapResult>("map");
     if (!writer_ || map->map == nullptr) return {};
 
+    // The frame of the results is stored, so that later exports and visits have the same coordinates.
     maps::ResultFrame frame;
     if (const auto dense = io.input<DenseCloud>("result")) {
       frame = {dense->output_from_map, dense->upright};
@@ -108,6 +113,7 @@ class StoreStage : public Stage {
       if (auto added = add_revised(*map->revised); !added) return added;
     }
 
+    // Frames after the last keyframe are not stored yet, nor are pictures for a camera that was found later.
     std::vector<maps::StoreStep> rest;
     for (auto& [robot, step] : steps_) rest.push_back(std::move(step));
     rest.emplace_back();

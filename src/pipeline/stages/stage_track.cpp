@@ -58,6 +58,8 @@ class TrackStage : public Stage {
   core::Result<void> start(const RunContext& context) override {
     context_ = &context;
     bodies_.emplace(recordings(), gyro_, wheels_, *context.log);
+
+    // A robot's map is begun in the same way when it is made again for a better camera.
     const auto begin = [this](const RobotInfo& robot) {
       auto slam = std::make_unique<mapping::Slam>(options_, robot.camera.color, robot.number,
                                                   *context_->executor, *context_->log);
@@ -74,6 +76,7 @@ class TrackStage : public Stage {
     observed_.resize(slams_.size());
     still_.resize(slams_.size());
 
+    // The store holds the cameras as they were found before: only later news of them is stored from here on.
     if (context.resumed != nullptr) restore(*context.resumed);
     stored_robots_ = cameras_->robots();
     stored_news_ = cameras_->news();

@@ -39,6 +39,8 @@ class VisitStage : public Stage {
     }
 
     auto result = std::make_shared<MapResult>(*before);
+
+    // The first of the maps is the one that is visited; the robots of all others are visitors.
     for (const maps::StoredPart& part : context_->input.stored_maps->parts()) {
       if (&part == &context_->input.stored_maps->parts().front()) continue;
       for (const RobotInfo& robot : part.robots) visitors_.insert(robot.number);
@@ -47,6 +49,8 @@ class VisitStage : public Stage {
     for (const core::KeyframeId id : before->map->keyframe_ids()) keyframes_ += visitors_.count(id.robot);
     auto revised = std::make_shared<RevisedClouds>();
 
+    // The poses of the earlier map are restored before surfaces are compared, so that its coordinates stay
+    // valid.
     const maps::StoredMap& earlier = context_->input.stored_maps->parts().front().run.stored();
     held_ = hold_earlier(maps::component(earlier.map, maps::main_root(earlier.map, earlier.frames)),
                          visitors_, *result);
@@ -92,6 +96,8 @@ class VisitStage : public Stage {
     for (std::size_t i = 0; i < map.trajectory.size(); ++i)
       frames[map.trajectory_ids[i]] = map.trajectory[i].world_from_camera;
 
+    // Clouds are those of keyframes or of frames in between. Without a pose in the result, as in a component
+    // that did not join, a cloud cannot be compared.
     for (const maps::StoredCloud& cloud : context_->input.stored_maps->clouds()) {
       const maps::StoredViews& views = context_->input.stored_maps->views_of(cloud);
       const View name{views.keyframes[cloud.view], views.frames[cloud.view]};
@@ -139,11 +145,14 @@ class VisitStage : public Stage {
       if (!changes->removed[v].empty()) revised.removed[all.names[v]] = std::move(changes->removed[v]);
     }
 
+    // Gone landmarks are removed before the redundant keyframes, whose observations show which landmarks the
+    // visit has seen.
     maps::Map map = *result.map;
     remove_gone(*changes, visitors_, map);
     gone_landmarks_ =
         result.map->point_count() + result.map->line_count() - map.point_count() - map.line_count();
 
+    // Frames are made relative to other keyframes while the poses of their own ones are still in the map.
     refer_to_others(map, redundant, result.frame_poses);
     result.map = std::make_shared<maps::Map>(maps::without(map, redundant));
     take_poses_from_map(result);

@@ -20,6 +20,7 @@ class FeaturesTap : public Tap {
         "kind,x_px,y_px,end_x_px,end_y_px,depth_m,octave,angle_deg,response,start_x_m,start_y_m,start_z_m,"
         "end_x_m,end_y_m,end_z_m\n");
 
+    // A depth of zero is no measurement: its cell stays empty, so that it is not taken for a distance.
     for (const features::PointFeature& p : features->points) {
       const std::string depth = p.depth > 0.0F ? fmt::format("{:.4f}", p.depth) : "";
       out.write(fmt::format("point,{:.2f},{:.2f},,,{},{},{:.2f},{:.6g},,,,,,\n", p.pixel.x(), p.pixel.y(),
@@ -31,6 +32,7 @@ class FeaturesTap : public Tap {
       out.write(fmt::format("line,{:.2f},{:.2f},{:.2f},{:.2f},,,,{:.6g},", s.start.x(), s.start.y(),
                             s.end.x(), s.end.y(), s.response));
 
+      // A line without usable depth is known in the image only.
       if (line.line3) {
         const Eigen::Vector3d& a = line.line3->start;
         const Eigen::Vector3d& b = line.line3->end;

@@ -28,6 +28,7 @@ void Tap::check(const CheckContext& /*context*/, const core::ConfigMark& mark, c
 
   if (file_.empty()) return refuse(fmt::format("a tap needs a file, e.g. file: {}", example));
 
+  // A tap is part of the result, which appears whole or not at all: it must not lie outside of the folder.
   const fs::path normal = fs::path(file_).lexically_normal();
   const bool outside = normal.is_absolute() || (!normal.empty() && *normal.begin() == "..");
   if (outside || !normal.has_filename()) {
@@ -44,6 +45,7 @@ void Tap::check(const CheckContext& /*context*/, const core::ConfigMark& mark, c
                        fmt::join(endings_, ", ")));
   }
 
+  // Without a number in its name each file would overwrite the one before.
   const auto stars = std::count(file_.begin(), file_.end(), '*');
   if (count_ == Count::kOne && stars != 0) refuse(file_ + ": one file is written here; leave out the *");
   if (count_ != Count::kOne && (stars != 1 || normal.filename().string().find('*') == std::string::npos)) {

@@ -30,6 +30,7 @@ core::Result<maps::StoreCloud> RevisedClouds::stored(const maps::StoredViews& vi
 
   maps::StoreCloud result{name.first, name.second, nullptr, nullptr};
 
+  // Most clouds lose no points and are copied as they are stored, without being decoded.
   if (removed.count(name) == 0) {
     auto surface = views.surface(view);
     if (!surface) return tl::unexpected<core::Error>(surface.error());
@@ -43,6 +44,7 @@ core::Result<maps::StoreCloud> RevisedClouds::stored(const maps::StoredViews& vi
   apply(name, **cloud);
   result.bytes = std::make_shared<std::vector<std::uint8_t>>(cloud::encode_cloud(**cloud));
 
+  // Later runs align keyframes by their coarse surfaces, which must lack what is gone as well.
   if (name.first.valid()) {
     result.surface = std::make_shared<maps::StoredSurface>(
         maps::StoredSurface{kSurfaceVoxel_m, mapping::coarse_surface(**cloud, kSurfaceVoxel_m)});

@@ -68,10 +68,13 @@ core::Result<Seen> read_seen(const std::vector<VisitedView>& views, bool of_visi
       seen.world_from_cloud[i] = view.world_from_camera * cloud::sensor_pose(**cloud);
       seen.rasters[i] = cloud::depth_raster(**cloud, view.camera);
       seen.is_depth_view[i] = cloud::is_depth_view(**cloud, view.camera) ? 1 : 0;
+
+      // Depth views test free space only and have no normals: they add no surface.
       if (seen.is_depth_view[i] == 0)
         samples[k] = cloud::VoxelMap::measured(**cloud, seen.world_from_cloud[i], options);
     });
 
+    // Samples enter in the order of the views, so that the result does not depend on the threads.
     for (std::size_t k = 0; k < count; ++k) {
       if (!done[k]) return tl::unexpected<core::Error>(done[k].error());
       voxels.insert(samples[k], everywhere);
@@ -140,6 +143,8 @@ std::vector<float> hidden_beyond(const cloud::DepthRaster& raster, const geometr
 
   for (const Eigen::Vector3d& position : surface) {
     const Eigen::Vector3d p = cloud_from_world * position;
+
+    // New surface contradicts this view only where the view measured free space.
     if (limits.evidence(p.cast<float>()) != Evidence::kFree) continue;
 
     if (beyond.empty()) beyond.assign(raster.nearest.size(), std::numeric_limits<float>::infinity());
@@ -149,6 +154,7 @@ std::vector<float> hidden_beyond(const cloud::DepthRaster& raster, const geometr
     const int column = static_cast<int>(pixel.x()) / cloud::DepthRaster::kCell_px;
     const int row = static_cast<int>(pixel.y()) / cloud::DepthRaster::kCell_px;
 
+    // The points of a surface have gaps between them, so the cells around are covered as well.
     for (int k = 0; k < 9; ++k) {
       const int x = column + k % 3 - 1, y = row + k / 3 - 1;
       if (x < 0 || y < 0 || x >= raster.width || y >= raster.height) continue;
@@ -173,6 +179,8 @@ std::vector<std::uint8_t> removed_points(const cloud::Cloud& cloud, const geomet
 
     bool goes = changes.is_gone(world_from_cloud * p);
 
+    // Rays to points behind new surface pass through it: if they stayed, their free space would remove the
+    // new surface in later fusions.
     const Eigen::Vector2d pixel = raster.camera.project(p);
     if (!goes && !beyond.empty() && raster.camera.contains(pixel, -0.49)) {
       const int column = static_cast<int>(pixel.x() + 0.5) / cloud::DepthRaster::kCell_px;
@@ -225,6 +233,7 @@ core::Result<VisitChanges> find_changes(const std::vector<VisitedView>& views, c
   Cells staying;
   changes.gone = gone_cells(*map, *visit, staying);
 
+  // New surface must lie away from all that stays, so what is gone is decided first.
   const std::vector<Eigen::Vector3d> surface = new_surface(*visit, staying);
   cloud::CellMap<std::uint32_t> numbers;
 
@@ -237,6 +246,7 @@ core::Result<VisitChanges> find_changes(const std::vector<VisitedView>& views, c
   changes.share_new.resize(views.size(), 0.0);
   std::vector<core::Result<void>> done(views.size());
 
+  // Clouds are read a second time instead of being kept, as those of a large map exceed the memory.
   const auto each = [&](const Seen& seen, std::size_t i) {
     const std::size_t v = seen.views[i];
     const auto cloud = read(v);

@@ -69,12 +69,16 @@ std::set<KeyframeId> redundant_keyframes(const maps::Map& map, const std::set<st
   std::vector<int> covered(changes.new_cells, 0);  // keyframes that show a new cell
   std::set<std::int32_t> begun;
 
+  // Keyframes of the map are all kept: a visit needs views of its own only where none of them is near.
   for (const KeyframeId id : map.keyframe_ids()) {
     if (visitors.count(id.robot) == 0) poses.add(map.camera_from_world(id));
   }
 
   for (const KeyframeId id : map.keyframe_ids()) {
     if (visitors.count(id.robot) == 0) continue;
+
+    // First keyframes and roots hold the map together, and what a keyframe without a cloud shows is not
+    // known: all of these stay.
     const auto view = views.find(id);
     bool keep = begun.insert(id.robot).second || view == views.end() || !map.parent(id).valid();
 
@@ -91,6 +95,7 @@ std::set<KeyframeId> redundant_keyframes(const maps::Map& map, const std::set<st
       continue;
     }
 
+    // Kept keyframes count for the following ones, which need not show the same surface again.
     poses.add(map.camera_from_world(id));
     if (view == views.end()) continue;
     for (const std::uint32_t cell : changes.shows[view->second]) ++covered[cell];
@@ -109,12 +114,14 @@ void refer_to_others(const maps::Map& map, const std::set<KeyframeId>& gone,
     if (gone.count(frame.reference) == 0) continue;
     const std::vector<KeyframeId>& others = kept.at(frame.reference.robot);
 
+    // The nearest keyframe in time most probably shows the same place, so adjustments move both alike.
     const KeyframeId nearest =
         *std::min_element(others.begin(), others.end(), [&](KeyframeId x, KeyframeId y) {
           return std::abs(map.keyframe(x).stamp - frame.stamp) <
                  std::abs(map.keyframe(y).stamp - frame.stamp);
         });
 
+    // The pose in the world stays as it was; only its reference changes.
     frame.camera_from_reference = frame.camera_from_reference * map.camera_from_world(frame.reference) *
                                   map.camera_from_world(nearest).inverse();
     frame.reference = nearest;

@@ -33,12 +33,16 @@ bool hold_earlier(const maps::Map& earlier, const std::set<std::int32_t>& visito
     if (visitors.count(id.robot) != 0 || !earlier.has_keyframe(id)) continue;
     const Rigid3 earlier_from_world = earlier.camera_from_world(id).inverse() * map.camera_from_world(id);
     const Eigen::Vector3d before = earlier.camera_from_world(id).inverse().translation;
+
+    // A loop that the visit closes has corrected the earlier map; its better poses must not be undone.
     if ((before - map.camera_from_world(id).inverse().translation).norm() >= kNewLoop_m) return false;
 
     corrections[id] = earlier_from_world;
     poses.emplace_back(id, earlier.camera_from_world(id));
   }
 
+  // Keyframes of the visit take the correction of the earlier keyframe beside them, or else that of their
+  // predecessor, so that they still fit the earlier map and their path does not jump.
   std::map<std::int32_t, Rigid3> last;  // by visitor
   for (const KeyframeId id : map.keyframe_ids()) {
     if (visitors.count(id.robot) == 0) continue;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Listens to what a run publishes, with an implementation of ROS 2's network that others wrote (@foxglove/ros2), decodes
-// it with theirs, and tells what came: node judge_ros2.mjs DOMAIN PREFIX [SECONDS [ROBOT]]. JUDGES: their node_modules.
+// it with theirs, and tells what came: node judge_ros2.mjs DOMAIN PREFIX [SECONDS [ROBOT [map|pose]]].
+// JUDGES: their node_modules.
 import { createRequire } from "node:module";
 
 const require = createRequire(process.env.JUDGES + "/");
@@ -11,6 +12,7 @@ const { MessageReader } = require("@foxglove/rosmsg2-serialization");
 
 const [domain, prefix, seconds] = [Number(process.argv[2]), process.argv[3], Number(process.argv[4] ?? 60)];
 const robot = process.argv[5] ?? prefix; // whose path and points are listened to
+const last = process.argv[6] ?? "map"; // after two seconds without it the run is over
 
 const header = "std_msgs/Header header\n";
 const separator = "================================================================================\nMSG: ";
@@ -28,6 +30,9 @@ const parts =
 const definitions = {
   "nav_msgs/msg/Path": header + "geometry_msgs/PoseStamped[] poses\n" + parts,
   "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms\n" + parts,
+  "geometry_msgs/msg/PoseWithCovarianceStamped":
+    header + "geometry_msgs/PoseWithCovariance pose\n" + parts +
+    separator + "geometry_msgs/PoseWithCovariance\ngeometry_msgs/Pose pose\nfloat64[36] covariance\n",
   "sensor_msgs/msg/PointCloud2":
     header + "uint32 height\nuint32 width\nsensor_msgs/PointField[] fields\nbool is_bigendian\nuint32 point_step\n" +
     "uint32 row_step\nuint8[] data\nbool is_dense\n" + parts,
@@ -37,6 +42,7 @@ const told = {
   tf: { messages: 0, chains: {} },
   path: { messages: 0, poses: 0, frame: "", last: null },
   points: { messages: 0, points: 0, frame: "" },
+  pose: { messages: 0, frame: "", last: null, covariance: [] },
   map: { messages: 0, points: 0, bytes: 0, frame: "", fields: [], low: null, high: null },
 };
 
@@ -51,6 +57,11 @@ function take(name, message) {
   if (name === "path") {
     into.poses = message.poses.length;
     into.last = message.poses.at(-1)?.pose.position ?? null;
+    return;
+  }
+  if (name === "pose") {
+    into.last = message.pose.pose.position;
+    into.covariance = Array.from(message.pose.covariance);
     return;
   }
   into.points += message.width * message.height;
@@ -81,13 +92,14 @@ await ros.start();
 let quiet;
 const end = () => {
   console.log(JSON.stringify(told));
-  process.exit(told.map.messages > 0 ? 0 : 1);
+  process.exit(told[last].messages > 0 ? 0 : 1);
 };
 const topics = [
   ["tf", "/tf", "tf2_msgs/msg/TFMessage"],
   ["path", `/${robot}/path`, "nav_msgs/msg/Path"],
   ["points", `/${robot}/points`, "sensor_msgs/msg/PointCloud2"],
   ["map", `/${prefix}/map`, "sensor_msgs/msg/PointCloud2"],
+  ["pose", `/${prefix}/pose`, "geometry_msgs/msg/PoseWithCovarianceStamped"],
 ];
 for (const [name, topic, dataType] of topics) {
   const msgDefinition = parse(definitions[dataType], { ros2: true });
@@ -95,7 +107,7 @@ for (const [name, topic, dataType] of topics) {
   const subscription = ros.subscribe({ topic, dataType, msgDefinition, skipParsing: true });
   subscription.on("message", (_stamp, _message, data) => {
     take(name, reader.readMessage(data));
-    if (told.map.messages > 0) {
+    if (told[last].messages > 0) {
       clearTimeout(quiet);
       quiet = setTimeout(end, 2000);
     }

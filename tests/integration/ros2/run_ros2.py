@@ -134,7 +134,13 @@ def messages(case):
         text = case.run("map", case.address(), "-o", case.work / "short", "--for", "2s", "--record", case.work / "short.txt",
                         code=2)
         check("ends in .mcap" in text, text)
-        text = case.run("map", case.address(), "-o", case.work / "short", "--for", "2s")
+        for size, word in (("1MB", "64MB or more"), ("much", "much"), ("100 parsecs", "unit")):
+            text = case.run("map", case.address(), "-o", case.work / "short", "--max-memory", size, code=2)
+            check(word in text, text)
+        text = case.run("map", room, "-o", case.work / "short", "--max-memory", "128MB", code=2)
+        check("are for live cameras" in text, text)
+        text = case.run("map", case.address(), "-o", case.work / "short", "--for", "2s", "--max-memory", "128MB")
+        check("up to 128 MB of frames wait" in text, text)
         check("received frames were mapped" in text, text)
     finally:
         playing.send_signal(signal.SIGINT)
@@ -147,6 +153,34 @@ def has_route():
     return any(line.split()[1] == "00000000" for line in routes)
 
 
+def listen(case, *arguments):
+    """The judge, once it listens."""
+    listening = subprocess.Popen(["node", HERE / "judge_ros2.mjs", str(case.domain), *map(str, arguments)],
+                                 env={**os.environ, "JUDGES": str(judges())}, stdout=subprocess.PIPE,
+                                 stderr=open(case.work / "judge.log", "w", encoding="utf-8"), text=True)
+    time.sleep(3.0)
+    return listening
+
+
+def check_poses(case, room):
+    """Poses of frames that were located in a finished map, and their covariance: row by row, metres and radians."""
+    listening = listen(case, "plumbline", 300, "plumbline", "pose")
+    case.run("localize", case.work / "out", room, "-o", case.work / "located", "--publish", f"ros2://{case.domain}", "-q")
+    heard, _ = listening.communicate(timeout=60)
+    check(listening.returncode == 0, f"no pose was heard: {heard}\n{case.log('judge.log')}")
+    pose = json.loads(heard)["pose"]
+    print(json.dumps(pose))
+
+    rows = [line.split() for line in (case.work / "located/trajectory.txt").read_text().splitlines() if line[0] != "#"]
+    check(pose["frame"] == "map", pose)
+    check(0.5 * len(rows) <= pose["messages"] <= len(rows), f"{pose['messages']} poses of {len(rows)} located frames")
+    off = sum((pose["last"][axis] - float(value)) ** 2 for axis, value in zip("xyz", rows[-1][1:4])) ** 0.5
+    check(off < 0.01, f"the last pose lies {off:.3f} m beside that of trajectory.txt")
+    matrix = pose["covariance"]
+    check(len(matrix) == 36 and all(0.0 < matrix[7 * i] < 0.01 for i in range(6)), matrix)
+    check(all(abs(matrix[6 * i + j] - matrix[6 * j + i]) < 1e-12 for i in range(6) for j in range(6)), matrix)
+
+
 def judge(case):
     if shutil.which("node") is None or not (judges() / "@foxglove/ros2").is_dir():
         print(f"no @foxglove/ros2 in {judges()}")
@@ -155,10 +189,7 @@ def judge(case):
         print("no network whose multicast the judge could listen to")
         return SKIPPED
     room = case.world(60)
-    listening = subprocess.Popen(["node", HERE / "judge_ros2.mjs", str(case.domain), "plumbline", "300"],
-                                 env={**os.environ, "JUDGES": str(judges())}, stdout=subprocess.PIPE,
-                                 stderr=open(case.work / "judge.log", "w", encoding="utf-8"), text=True)
-    time.sleep(3.0)
+    listening = listen(case, "plumbline", 300)
     case.run("map", room, "-o", case.work / "out", "--publish", f"ros2://{case.domain}", "-q")
     heard, _ = listening.communicate(timeout=60)
     check(listening.returncode == 0, f"nothing was heard: {heard}\n{case.log('judge.log')}")
@@ -176,6 +207,7 @@ def judge(case):
     for name in FILES:
         same = (case.work / "out" / name).read_bytes() == (case.work / "silent" / name).read_bytes()
         check(same, f"{name} is another one when it is published")
+    check_poses(case, room)
     return 0
 
 
@@ -183,10 +215,7 @@ def robots(case):
     if shutil.which("node") is None or not (judges() / "@foxglove/ros2").is_dir() or not has_route():
         print(f"no @foxglove/ros2 in {judges()}, or no network that it could listen to")
         return SKIPPED
-    listening = subprocess.Popen(["node", HERE / "judge_ros2.mjs", str(case.domain), "plumbline", "400", "r0"],
-                                 env={**os.environ, "JUDGES": str(judges())}, stdout=subprocess.PIPE,
-                                 stderr=open(case.work / "judge.log", "w", encoding="utf-8"), text=True)
-    time.sleep(3.0)
+    listening = listen(case, "plumbline", 400, "r0")
     # Robots and hub have a domain of their own; what they publish is in another one.
     lan = ["--interface", "lo", "--domain", case.domain + 95]
     publish = ["--publish", f"ros2://{case.domain}"]
