@@ -9,6 +9,7 @@
 namespace plumbline::dataset {
 namespace {
 
+/// The frames of any recording on disk, of a bag or a film as of a folder: Layout::images knows which.
 class FolderSource final : public FrameSource, public BodySource {
  public:
   FolderSource(std::string name, Layout layout, sensor::Camera camera, const sensor::Pinhole& rectified)

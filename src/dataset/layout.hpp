@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Finds the pairs of a recording on disk, with one function per layout.
+// Finds the pairs of a recording on disk, with one function per layout. A bag's Layout is made by read_bag
+// (bags/bag_recording.hpp).
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -57,7 +58,7 @@ struct StampedFile {
   int line = 0;
 };
 
-/// The FrameSource behind every layout on disk.
+/// The FrameSource of every recording on disk, bags included.
 std::unique_ptr<FrameSource> make_folder_source(std::string name, Layout layout, sensor::Camera camera,
                                                 std::string doubt = "");
 
@@ -66,8 +67,9 @@ struct LayoutFormat {
   const char* name;        ///< value of --format
   const char* program;     ///< program that writes it, for messages
   const char* looked_for;  ///< for messages
-  /// Files and folders that must exist; '|' separates alternatives, of which one suffices. A name that ends
-  /// in '/' is a folder.
+  /// Files and folders of a whole recording, for messages and for what must not be written over; '|'
+  /// separates alternatives, of which one suffices. A name that ends in '/' is a folder. `recognises` decides
+  /// by itself.
   std::vector<std::string> parts;
   bool (*recognises)(const std::filesystem::path& folder);
   core::Result<Layout> (*read)(const std::filesystem::path& folder, const LayoutOptions& options,
@@ -112,8 +114,8 @@ std::vector<long long> numbers_of(const std::string& name);
 /// 4x4 world_from_camera in a separate file; none where tracking was lost (NaN or infinity) or it is
 /// unusable.
 std::optional<geometry::Rigid3> read_pose_file(const std::string& file);
-/// Images of a folder whose names have a number, by the first number in them; a number seen twice keeps the
-/// first name.
+/// Images of a folder whose names have a number, by the first number after the prefix; a number seen twice
+/// keeps the first name, so colour and depth in one folder need different prefixes.
 using NumberedFiles = std::vector<std::pair<long long, std::string>>;
 NumberedFiles numbered_images(const std::filesystem::path& folder, const std::string& prefix = "");
 /// Pairs of images with one number, stamps number / fps.

@@ -13,9 +13,11 @@ namespace plumbline::exports {
 
 struct Format {
   std::string name;
-  std::vector<std::string> endings;  ///< file name endings, the longest match decides; empty: a folder
-  std::vector<Content> contents;     ///< possible contents, the default first
-  std::string needs;                 ///< "map.db" or "recording" besides a map; empty: a cloud is enough
+  /// File name endings, the longest match decides; of equal ones the first format that can hold the content
+  /// that is asked for. Empty: a folder.
+  std::vector<std::string> endings;
+  std::vector<Content> contents;  ///< possible contents, the default first
+  std::string needs;              ///< "map.db" or "recording" besides a map; empty: a cloud is enough
   std::string title;
   std::string description;           ///< Markdown
   std::vector<std::string> options;  ///< keys of ExportOptions besides common_options()

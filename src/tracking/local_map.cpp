@@ -104,6 +104,7 @@ void LocalMapOptions::declare(core::OptionTable& table) {
 LocalMap build_local_map(const maps::Map& map, KeyframeId reference, const LocalMapOptions& options) {
   LocalMap local;
   local.reference = reference;
+  local.max_surface_depth_m = options.max_surface_depth_m;
   local.keyframes.push_back(reference);
   const auto wanted = static_cast<std::size_t>(options.keyframes);
   for (const KeyframeId id : map.neighbours(reference, wanted - 1)) append_unique(local.keyframes, id);

@@ -76,7 +76,9 @@ class Slam {
 
   using Features = std::shared_ptr<const features::FrameFeatures>;
   enum class Keyframe { kByRule, kYes, kNo };  ///< whether a frame becomes a keyframe
-  /// Frames in order of time. The features are kept when the frame becomes a keyframe.
+  /// Frames in order of time. The features are kept when the frame becomes a keyframe. The report's state may
+  /// be lost although the tracker found a pose: at a place that is not confirmed yet, or one that is not
+  /// accurate.
   FrameReport process(const sensor::RgbdFrame& frame, const Features& features,
                       Keyframe keyframe = Keyframe::kByRule);
   /// Ends the background work; call once, after the last frame.

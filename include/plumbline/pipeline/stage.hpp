@@ -192,7 +192,8 @@ struct RunContext {
 
 /// Why a result must not be trusted.
 struct Doubt {
-  /// The gravest first: only the first one is reported, lost frames together with separate components.
+  /// The gravest first, but kRecording before all others, as their cause. Only the first one is the reason,
+  /// lost frames together with separate components (summary/verdict.cpp).
   enum class About {
     kLostFrames,
     kComponents,

@@ -2,7 +2,8 @@
 #pragma once
 
 // The verdict on a result: `verdict` in summary.json, and `trustworthy` and `reason`, which follow from it.
-// Nothing else writes them.
+// Nothing else writes them, but for the empty sections that a run begins with. Whether a path is right is
+// judged by check/verdict.cpp; exit code 4 is given by the command (cli/app.cpp).
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>

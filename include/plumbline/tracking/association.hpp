@@ -64,7 +64,7 @@ std::vector<LineMatch> match_lines(const maps::Map& map, const std::vector<core:
 struct SurfaceAssociationOptions {
   double max_distance_m = 0.10;  ///< measured point from the tangent plane
   int max_samples = 2000;
-  double max_depth_m = 6.0;
+  double max_depth_m = 6.0;  ///< of the measured point
 };
 
 /// A depth image, and a guess of the pose of the colour image's camera. What it refers to must outlive it.

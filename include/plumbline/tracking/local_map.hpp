@@ -21,6 +21,7 @@ struct LocalMapOptions {
   int surface_keyframes = 4;  ///< number of keyframes whose surfaces are used
   double voxel_m = 0.03;      ///< surface samples of all these are fused within
   double overlap_angle_rad = 0.6;
+  double max_surface_depth_m = 6.0;  ///< the mapper's option surface.max_depth
   void declare(core::OptionTable& table);
 };
 
@@ -30,6 +31,7 @@ struct LocalMap {
   std::vector<core::PointId> points;        ///< sorted, unique
   std::vector<core::LineId> lines;
   std::vector<WorldSurface> surface;  ///< interleaved, so that any prefix is spread over all keyframes
+  double max_surface_depth_m = 6.0;   ///< depth beyond it is not aligned with `surface`
 };
 
 /// Keyframes that share landmarks with `reference`, filled up with the latest ones that face the same way

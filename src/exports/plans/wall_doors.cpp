@@ -24,7 +24,8 @@ bool open_column(const WallRaster& raster, int column, const Cut& cut) {
   return raster.seen(column, 0.25, 0.8) <= kMost && raster.seen(column, cut.low_m, cut.high_m) <= kMost;
 }
 
-/// True if cameras looked through; if the rays are not known, true if there is a lintel above.
+/// True if cameras looked through; if the rays are not known, true if there is a lintel above. Doors are such
+/// openings, too: measure_doors() distinguishes OpeningKind::kPassage by width and head.
 bool is_passage(const WallRaster& raster, int a, int b, const Cut& cut) {
   constexpr double kLeastCrossed = 0.08;
   constexpr double kLeastLintel = 0.3;

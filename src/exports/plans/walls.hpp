@@ -28,7 +28,7 @@ struct WallLine {
   double thickness_m = 0.0;             ///< of the wall; 0: its other face was not seen
   double high = 0.0;                    ///< share of its length that was seen up to where furniture ends
   bool low = false;                     ///< it ends below the height of furniture
-  std::vector<WallOpening> openings;    ///< doors, in order, apart
+  std::vector<WallOpening> openings;    ///< doors and passages, in order, apart
   std::vector<WallOpening> gaps;        ///< parts that the cut passes through or over: windows, lower parts
   std::array<int, 2> corner{-1, -1};    ///< the line that its first and its last end meet; -1: none
   std::array<int, 2> corner_end{0, 0};  ///< end of that line: 0 first, 1 last, 2 somewhere along it
@@ -38,9 +38,10 @@ struct WallLine {
   [[nodiscard]] double length() const { return s1 - s0; }
 };
 
+/// Passages are wide or high openings, which have no leaf (measure_doors).
 enum class OpeningKind { kDoor, kPassage, kWindow };
 
-/// An opening, with both sides of its wall where both were seen.
+/// An opening of any kind, windows included, with both sides of its wall where both were seen.
 struct WallDoor {
   std::array<Eigen::Vector2d, 2> jambs;  ///< on the one side, which is on the right of the way between them
   std::array<Eigen::Vector2d, 2> far_jambs;  ///< on the other; equal where it was not seen

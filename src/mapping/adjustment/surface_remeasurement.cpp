@@ -109,7 +109,7 @@ class SurfaceReader {
       const Rigid3 b_from_a = map_.camera_from_world(edge.b) * map_.camera_from_world(edge.a).inverse();
       tasks[i].found =
           align_surface_edge(map_.keyframe(edge.a), edge.b, of_b.depth, b_from_a, of_b.depth_from_camera,
-                             camera_, {how_.min_overlap},
+                             camera_, {how_.min_overlap, how_.sampler.max_depth_m},
                              {of_a == samples_.end() ? nullptr : of_a->second.get(), of_b.photometric.get()});
     });
 

@@ -54,6 +54,7 @@ LocalMapper::LocalMapper(const LocalMapperOptions& options, const tracking::Trac
   options_.triangulation.scale_factor = tracker.association.scale_factor;
   options_.triangulation.aligned = tracker.association.aligned_sigma;
   options_.edges = options.edges && tracker.depth;
+  local_map_.max_surface_depth_m = options.surface.max_depth_m;
 }
 
 core::KeyframeId LocalMapper::insert(maps::Map& map, const sensor::RgbdFrame& frame,
@@ -175,7 +176,7 @@ std::optional<SurfaceEdgeJob> LocalMapper::begin_surface_edges(const maps::Map& 
 
   NewestSurface newest{id, depth, track.depth_from_camera, track.photometric};
   return SurfaceEdgeJob(std::move(newest), std::move(surfaces), options_.edge_keyframes, camera_,
-                        {options_.edge_min_overlap}, executor);
+                        {options_.edge_min_overlap, options_.surface.max_depth_m}, executor);
 }
 
 void LocalMapper::keep_intensities(core::KeyframeId id, const cv::Mat& depth,

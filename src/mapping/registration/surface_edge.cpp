@@ -95,6 +95,7 @@ std::optional<maps::SurfaceEdge> align_surface_edge(const maps::Keyframe& a, cor
   for (const double distance : {0.08, 0.05, 0.03, 0.03, 0.03}) {
     tracking::SurfaceAssociationOptions association;
     association.max_distance_m = distance;
+    association.max_depth_m = options.max_depth_m;
     problem.photometric.reset();
 
     if (images.of_a != nullptr && images.of_b != nullptr) {

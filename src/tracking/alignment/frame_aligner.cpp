@@ -145,6 +145,7 @@ void FrameAligner::associate_surface(const AlignmentRound& round) {
   SurfaceAssociationOptions how;
   how.max_distance_m = round.max_plane_distance_m;
   how.max_samples = round.surface_samples;
+  how.max_depth_m = in_.around.local_map.max_surface_depth_m;
   problem_.planes = tracking::associate_surface(
       in_.around.local_map.surface,
       {frame().depth, in_.camera, result_.camera_from_world, motion_.depth_from_camera}, how,

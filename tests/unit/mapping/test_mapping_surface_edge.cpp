@@ -153,6 +153,10 @@ TEST(SurfaceEdge, WithoutOverlapThereIsNone) {
   EXPECT_FALSE(
       align_surface_edge(first_view(kCorner), {0, 1}, look(kCorner, kTruth, 2), away, {}, kSurfaceCamera, {})
           .has_value());
+  EXPECT_FALSE(align_surface_edge(first_view(kCorner), {0, 1}, look(kCorner, kTruth, 2), kTruth, {},
+                                  kSurfaceCamera, {0.25, 0.5})
+                   .has_value())
+      << "all of it is beyond the largest depth";
   EXPECT_FALSE(
       align_surface_edge(first_view(kCorner), {0, 1}, cv::Mat(), kTruth, {}, kSurfaceCamera, {}).has_value());
   maps::Keyframe bare;

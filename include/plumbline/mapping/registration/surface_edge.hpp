@@ -15,6 +15,7 @@ namespace plumbline::mapping {
 
 struct SurfaceEdgeOptions {
   double min_overlap = 0.25;  ///< share of a's samples that b's depth must confirm
+  double max_depth_m = 6.0;   ///< of b
   double hold_m = 0.01;       ///< standard deviation of the start, see align_surface_edge
 };
 
