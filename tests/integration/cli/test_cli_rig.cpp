@@ -24,14 +24,14 @@ class Rig : public ProgramTest {
       " -q --set output.views= --set output.pcd=off --set cloud.filters=[] --set fuse.voxel=3cm";
 
   /// Two cameras back to back, filmed while they are carried through a room.
-  void film(const std::string& options = "") const {
+  void film(const std::string& options = "", const std::string& scene = "room") const {
     write("body.yaml",
           "cameras:\n  - {at: [0, 0, 0]}\n  - {at: [-0.1, 0.02, 0.03], yaw: 176 deg, pitch: 4 deg}\n");
     write("unknown.yaml", "cameras: {robot0: {}, robot1: {}}\n");
-    const Outcome filmed =
-        run("synth room -o world --rig body.yaml --frames 240 --fps 10 --width 320 --height 240 "
-            "--reference-spacing 5cm -q " +
-            options);
+    const Outcome filmed = run("synth " + scene +
+                               " -o world --rig body.yaml --frames 240 --fps 10 --width 320 --height 240 "
+                               "--reference-spacing 5cm -q " +
+                               options);
     ASSERT_EQ(filmed.code, 0) << filmed;
   }
   /// robot0_from_robot1
@@ -64,10 +64,13 @@ class Rig : public ProgramTest {
     }
     EXPECT_GT(common, 200);
   }
-  [[nodiscard]] double completeness(const std::string& result) const {
-    const Outcome o =
-        run("evaluate cloud " + result + "/map.ply world/reference.ply --json cloud.json --align none");
-    return o.code == 0 ? read_json(path("cloud.json"))["completeness"].get<double>() : -1.0;
+  /// Share of what the cameras could see that is in the cloud.
+  [[nodiscard]] double recall(const std::string& result, const std::string& path_in_it) const {
+    const Outcome o = run("evaluate cloud " + result + " world --align se3 --json --trajectory " + result +
+                          "/" + path_in_it + " --truth world/robot0");
+    const auto report = nlohmann::json::parse(o.out, nullptr, false);
+    EXPECT_EQ(o.code, 0) << o;
+    return o.code == 0 ? report["at"]["20mm"]["recall"].get<double>() : 0.0;
   }
 };
 
@@ -89,6 +92,10 @@ TEST_F(Rig, CamerasBackToBackAreFoundFromTheirMotion) {
   EXPECT_GT(summary["rig"]["cameras"][0]["pairs"], 5);
   EXPECT_EQ(summary["merges"][0]["by"], "rig");
   EXPECT_TRUE(summary["merges"][0]["accepted"]);
+
+  // Both look at different sides of the room from the same path.
+  ASSERT_EQ(run("map world/robot0 -o alone" + std::string(kLean)).code, 0);
+  EXPECT_GT(recall("one", "robots/robot0/trajectory.txt"), 1.5 * recall("alone", "trajectory.txt"));
 
   // The order of the recordings and the threads leave no trace.
   ASSERT_EQ(
@@ -131,7 +138,15 @@ TEST_F(Rig, FinishedMapsWithAGivenPose) {
 }
 
 TEST_F(Rig, WheelsNeedTheHeightBetweenTheCameras) {
-  film("--motion wheeled");
+  // A path on which the camera keeps its height and its tilt.
+  std::string scene = slurp(fs::path(PLUMBLINE_SOURCE_DIR) / "pipelines/scenes/room.yaml");
+  scene.erase(scene.find("robots:"));
+  write("wheels.yaml", scene +
+                           "robots:\n  - name: cart\n    closed: true\n    speed: 0.4\n    turn_rate: 0.5\n"
+                           "    height: 1.2\n    pitch: -8 deg\n    path:\n"
+                           "      - {at: [3.4, 1.0]}\n      - {at: [3.6, 2.0]}\n      - {at: [3.0, 2.8]}\n"
+                           "      - {at: [2.4, 2.4]}\n      - {at: [2.3, 1.4]}\n      - {at: [2.8, 0.9]}\n");
+  film("--motion wheeled", "wheels.yaml");
   const Outcome open = run("map world/robot0 world/robot1 --rig unknown.yaml -o open" + std::string(kLean));
   EXPECT_EQ(open.code, 3) << open;
   EXPECT_TRUE(open.told("the motion does not show its position along")) << open;
