@@ -28,6 +28,7 @@ core::FileNames result_files() {
                         "georeference.json",
                         "tags.csv",
                         "edits.yaml",
+                        "rig.yaml",
                         "hub.log",
                         "report.html",
                         "evaluation.json",

@@ -70,6 +70,8 @@ void add_recording_options(CLI::App& command, pipeline::MapRequest& request);
 void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& request);
 /// "701362 4485513 0 m (...)": the shift subtracted from large coordinates when a cloud was read.
 std::string shift_text(const Eigen::Vector3d& shift);
+/// --rig FILE, for commands that map or fuse.
+void add_rig_option(CLI::App& command, std::filesystem::path& rig);
 /// --from S and --to S, for commands that read recordings.
 void add_time_range(CLI::App& command, dataset::OpenOptions& open);
 /// --for and --record, for commands that map live cameras.

@@ -120,6 +120,7 @@ core::Result<pipeline::RunSummary> run_map(const std::string& input, const fs::p
   request.resume = options.resume;
   request.known_map = options.known_map;
   request.into = options.into;
+  request.rig = options.rig;
   return run_map(request, options);
 }
 
@@ -131,6 +132,7 @@ core::Result<pipeline::RunSummary> run_fuse(const std::vector<fs::path>& maps, c
     if (auto filled = fill(request, options, output); !filled) return tl::unexpected(filled.error());
     request.maps = maps;
     request.anchor = options.anchor;
+    request.rig = options.rig;
 
     const OpenCvThreads one;
     const core::Executor executor(options.threads);

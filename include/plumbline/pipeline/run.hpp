@@ -31,7 +31,8 @@ struct RunRequest {
   std::filesystem::path pipelines_folder;  ///< shipped pipelines, with cameras/, filters/ and scenes/
   cloud::FilterRegistry filters = cloud::builtin_filters();  ///< with those of plugins
   bool replace = false;                                      ///< replace an earlier result
-  std::shared_ptr<RunObserver> observer;                     ///< observer of the run; null: none
+  std::filesystem::path rig;  ///< rig.yaml: robots that are cameras fixed to each other; empty: none
+  std::shared_ptr<RunObserver> observer;  ///< observer of the run; null: none
   /// Called at the end of a run with the name of each stage whose end begins ("refine", "fuse, output"). May
   /// be empty.
   std::function<void(const std::string&)> finishing;

@@ -63,6 +63,7 @@ namespace plumbline::pipeline {
 
 class RunObserver;
 struct ResumedRun;
+struct Rig;
 class RobotRecordings;
 
 /// Rate at which a port carries values.
@@ -143,10 +144,11 @@ struct RunInput {
   const maps::StoredMaps* stored_maps = nullptr;         ///< input of a maps stage; null: there is none
   const std::vector<maps::RobotInfo>* robots = nullptr;  ///< robots of the recordings or maps, by number
   std::shared_ptr<const localize::LocalizationMap>
-      known_map;       ///< map of a localize stage; null: there is none
-  bool into = false;   ///< the other stored maps are visits of the first one
-  std::string anchor;  ///< robot that defines the common frame of finished maps; empty: any
-  std::string text;    ///< text that identifies what is mapped
+      known_map;             ///< map of a localize stage; null: there is none
+  bool into = false;         ///< the other stored maps are visits of the first one
+  std::string anchor;        ///< robot that defines the common frame of finished maps; empty: any
+  const Rig* rig = nullptr;  ///< cameras that are fixed to each other; null: none
+  std::string text;          ///< text that identifies what is mapped
 };
 
 /// Data kept in map.db.
@@ -272,6 +274,9 @@ class Stage {
   [[nodiscard]] virtual bool takes_given_poses() const { return false; }
   /// True if it begins with finished maps (RunInput::stored_maps). Called before the run.
   [[nodiscard]] virtual bool reads_maps() const { return false; }
+  /// True if it joins the maps of cameras that are fixed to each other (RunInput::rig). Called before the
+  /// run.
+  [[nodiscard]] virtual bool takes_rig() const { return false; }
   /// True if it locates the camera in a finished map (RunInput::known_map). Called before the run.
   [[nodiscard]] virtual bool knows_map() const { return false; }
   /// True if its clouds are kept in a store until their poses are final. Called before the run.

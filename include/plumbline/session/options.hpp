@@ -51,10 +51,12 @@ struct MapOptions : RunOptions, RecordingOptions {
   std::filesystem::path known_map;
   /// A finished map that the recording is another visit of: both are in `output`, in its frame; empty: none.
   std::filesystem::path into;
+  std::filesystem::path rig;  ///< rig.yaml: the recordings are of cameras that are fixed to each other
 };
 
 struct FuseOptions : RunOptions {
-  std::string anchor;  ///< robot whose map defines the frame; empty: the one with the largest map
+  std::string anchor;         ///< robot whose map defines the frame; empty: the one with the largest map
+  std::filesystem::path rig;  ///< rig.yaml: the maps are of cameras that are fixed to each other
 };
 
 struct MapperOptions : RunOptions {

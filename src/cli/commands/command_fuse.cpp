@@ -70,6 +70,7 @@ void add_fuse(CLI::App& app, Session& session) {
       ->expected(1)
       ->take_all()
       ->type_name("X,Y,Z=X,Y,Z");
+  add_rig_option(*command, request->rig);
   add_pipeline_options(*command, session, *request);
 }
 

@@ -102,6 +102,15 @@ void add_recording_options(CLI::App& command, pipeline::MapRequest& request) {
   add_live_options(command, request);
 }
 
+void add_rig_option(CLI::App& command, std::filesystem::path& rig) {
+  command
+      .add_option(
+          "--rig", rig,
+          "YAML file with the cameras of one robot, by the names of their recordings or maps: they are "
+          "joined by their poses on it, given or found from their motion")
+      ->type_name("FILE");
+}
+
 /// Options that map and robot share.
 void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& request) {
   add_recording_options(command, request);
@@ -163,6 +172,9 @@ void add_map(CLI::App& app, Session& session) {
           "Another visit of this map (result folder or map.db), which stays as it is: OUT holds both, in "
           "its frame, without what is gone")
       ->type_name("MAP");
+
+  // Cameras of one robot
+  add_rig_option(*command, request->rig);
 
   // Display, pipeline and debugging
   add_frames_options(*command, *publish);

@@ -31,8 +31,54 @@ std::size_t largest_group(const std::vector<RobotMap>& parts, const std::vector<
   return static_cast<std::size_t>(std::max_element(keyframes.begin(), keyframes.end()) - keyframes.begin());
 }
 
+using PartPair = std::pair<std::size_t, std::size_t>;
+
+/// True if both put b's cameras at the same place, but for the drift of a robot's path.
+bool agree(const mapping::Alignment& places, const mapping::Alignment& rig, const maps::Map& b) {
+  constexpr double kApart_m = 0.5, kTurned_rad = 0.2;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  const std::vector<core::KeyframeId> ids = b.keyframe_ids();
+  for (const core::KeyframeId id : ids)
+    middle += b.camera_from_world(id).inverse().translation / static_cast<double>(ids.size());
+  return (places.a_from_b * middle - rig.a_from_b * middle).norm() < kApart_m &&
+         geometry::rotation_angle(places.a_from_b.rotation.transpose() * rig.a_from_b.rotation) < kTurned_rad;
+}
+
+/// Puts known merges into the evidence; returns the pairs of parts that a rig joins.
+std::set<PartPair> put_in(const std::vector<KnownMerge>& known, const std::vector<RobotMap>& parts,
+                          std::vector<mapping::MergeEvidence>& evidence, core::Log& log) {
+  std::set<PartPair> by_rig;
+  for (const KnownMerge& one : known) {
+    const mapping::MergeEvidence& merge = one.evidence;
+    const auto found = std::find_if(evidence.begin(), evidence.end(), [&](const mapping::MergeEvidence& e) {
+      return e.a == merge.a && e.b == merge.b;
+    });
+    if (found == evidence.end()) continue;
+
+    // Things that one camera sees later than the other tie them beyond the rig, unless it is another place.
+    std::vector<mapping::VerifiedPair> seen;
+    const bool again = one.by == KnownMerge::By::kRig && found->accepted;
+    if (again && agree(found->alignment, merge.alignment, *parts[merge.b].map)) {
+      seen = found->pairs;
+    } else if (again) {
+      log.info(fmt::format("{} and {}: places that look alike contradict the rig and are not used",
+                           parts[merge.a].name, parts[merge.b].name));
+    }
+
+    *found = merge;
+    found->pairs.insert(found->pairs.end(), seen.begin(), seen.end());
+    if (one.by == KnownMerge::By::kRig) by_rig.emplace(merge.a, merge.b);
+  }
+  return by_rig;
+}
+
 void report(const RobotMerge& merge, core::Log& log) {
   const mapping::MergeEvidence& e = merge.evidence;
+  if (merge.by_rig && e.accepted) {
+    log.info(fmt::format("{} and {} are cameras of one rig: {} pairs of keyframes, {} rejected", merge.a,
+                         merge.b, e.pairs.size(), e.rejected));
+    return;
+  }
   const std::string tried =
       fmt::format("{} pairs of keyframes look alike, {} were tried, {} show the same place", e.candidates,
                   e.tried, e.consistency.verified);
@@ -154,6 +200,7 @@ Json section_of(const RobotMerge& merge) {
 
   // A refused merge has no relative pose; a negative time is not known, or the merge came after mapping.
   if (e.accepted) add_alignment(e.alignment, entry);
+  if (merge.by_rig) entry["by"] = "rig";
   if (merge.time_s >= 0.0) entry["time_s"] = rounded(merge.time_s);
   if (merge.evident_s >= 0.0) entry["evident_s"] = rounded(merge.evident_s);
   return entry;
@@ -161,17 +208,15 @@ Json section_of(const RobotMerge& merge) {
 
 MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor,
                           const mapping::MapFusionOptions& options, const core::Executor& executor,
-                          core::Log& log, const std::optional<mapping::MergeEvidence>& picked) {
+                          core::Log& log, const std::vector<KnownMerge>& known) {
   const std::vector<mapping::MapPart> maps = maps_of(parts);
   mapping::OverlapFinder places = mapping::learn_places(maps, options);
   std::vector<mapping::MergeEvidence> evidence =
       mapping::find_overlaps(maps, places.look_at_all(maps, executor), options, executor);
 
-  // Picks by the user replace the comparison of their maps, which may have been refused for too little
-  // overlap.
-  for (mapping::MergeEvidence& merge : evidence) {
-    if (picked && merge.a == picked->a && merge.b == picked->b) merge = *picked;
-  }
+  // Merges that are known from elsewhere replace the comparison of their maps, which may have been refused
+  // for too little overlap.
+  const auto by_rig = put_in(known, parts, evidence, log);
   if (anchor >= parts.size()) {
     anchor = largest_group(parts, mapping::connected_parts(parts.size(), evidence));
   }
@@ -183,7 +228,8 @@ MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor
   for (mapping::MergeEvidence& merge : evidence) {
     const std::string& a = parts[merge.a].name;
     const std::string& b = parts[merge.b].name;
-    result.merges.push_back({a, b, -1.0, -1.0, std::move(merge)});
+    const bool rigid = by_rig.count({merge.a, merge.b}) != 0;
+    result.merges.push_back({a, b, -1.0, -1.0, std::move(merge), rigid});
     report(result.merges.back(), log);
   }
 

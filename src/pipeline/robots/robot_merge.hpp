@@ -3,7 +3,6 @@
 
 // Maps of several robots as one map result, with its summary.
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +22,7 @@ struct RobotMerge {
   /// negative: not known.
   double evident_s = -1.0;
   mapping::MergeEvidence evidence;
+  bool by_rig = false;  ///< the two are cameras that are fixed to each other
 };
 Json section_of(const RobotMerge& merge);
 
@@ -33,11 +33,19 @@ struct MergedRobots {
   std::size_t refused = 0;  ///< number of adjustments that would have torn a map
 };
 
+/// A merge that is known from elsewhere than the places that both maps show.
+struct KnownMerge {
+  enum class By { kPicks, kRig };
+  mapping::MergeEvidence evidence;
+  By by = By::kPicks;
+};
+
 /// Fuses the parts that are connected with `anchor`; if that is parts.size(), the connected group that has
-/// most keyframes. `picked`: a merge that the user knows.
+/// most keyframes. `known`: picks replace what places show; pairs of a rig join
+/// those of places that agree with it.
 MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor,
                           const mapping::MapFusionOptions& options, const core::Executor& executor,
-                          core::Log& log, const std::optional<mapping::MergeEvidence>& picked = {});
+                          core::Log& log, const std::vector<KnownMerge>& known = {});
 
 /// The first part as it is, the others apart. `state`: its covariances, by number of robot and stamp.
 std::shared_ptr<MapResult> kept_map(const std::vector<RobotMap>& parts, const maps::FusionState& state);

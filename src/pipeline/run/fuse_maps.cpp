@@ -3,9 +3,11 @@
 
 #include <fmt/format.h>
 
+#include "graph/graph_parts.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/core/version.hpp"
 #include "plumbline/maps/stored_maps.hpp"
+#include "plumbline/pipeline/rig.hpp"
 #include "results/waiting_clouds.hpp"
 #include "run/result.hpp"
 
@@ -22,6 +24,7 @@ std::string config_text(const FuseRequest& request, const maps::StoredMaps& maps
   }
   text += fmt::format("]\n  anchor: \"{}\"\n", request.anchor);
   if (!request.into.empty()) text += "  into: on\n";
+  if (!request.rig.empty()) text += fmt::format("  rig: {}\n", quoted(request.rig.string()));
   return text + to_yaml(graph);
 }
 
@@ -72,6 +75,14 @@ core::Result<void> set_picks(const FuseRequest& request, maps::StoredMaps& maps)
   return {};
 }
 
+/// The rig of the maps' robots. Errors (kUsage).
+core::Result<std::optional<Rig>> rig_of(const FuseRequest& request, const maps::StoredMaps& maps) {
+  if (request.rig.empty()) return std::optional<Rig>();
+  if (!request.picks.empty() || !request.into.empty() || request.change)
+    return core::usage_error("--rig: joins maps of one robot's cameras; leave out --pick and --into");
+  return rig_of_run(request.rig, maps.robots());
+}
+
 RunContext context_of(const FuseRequest& request, const maps::StoredMaps& maps, const Graph& graph,
                       const std::filesystem::path& folder) {
   RunContext context;
@@ -101,6 +112,8 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
   const auto maps = open_maps(request, executor);
   if (!maps) return tl::unexpected(maps.error());
   if (auto picked = set_picks(request, **maps); !picked) return tl::unexpected(picked.error());
+  const auto rig = rig_of(request, **maps);
+  if (!rig) return tl::unexpected(rig.error());
 
   // A change, such as a scale from control points, comes first: if it fails, no output folder is touched.
   std::map<std::string, std::string> files;
@@ -116,6 +129,7 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
   context.executor = &executor;
   context.log = &log;
   context.stop = stop;
+  if (*rig) context.input.rig = &**rig;
 
   // The folder notes the files that it will hold, so that replacing it later removes these and nothing else.
   if (auto ok = announce_files(*graph, {}, *output); !ok) return tl::unexpected(ok.error());

@@ -19,6 +19,7 @@
 #include "plumbline/maps/output_folder.hpp"
 #include "plumbline/pipeline/graph.hpp"
 #include "plumbline/pipeline/input.hpp"
+#include "plumbline/pipeline/rig.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "results/debug_video.hpp"
 #include "results/resumed_run.hpp"
@@ -90,6 +91,8 @@ std::string config_text(const MapRequest& request, const Graph& graph, int threa
   if (request.live != nullptr) text += "  fed: on\n";
   if (request.feedback != nullptr) text += "  feedback: on\n";
   if (request.open.poses == dataset::PoseUse::kIgnore) text += "  poses: ignore\n";
+  // A run that ended because the rig could not be found is continued with more in rig.yaml.
+  if (threads > 0 && !request.rig.empty()) text += fmt::format("  rig: {}\n", quoted(request.rig.string()));
 
   // The number of threads does not change a result, so a resumed run may have another one.
   if (threads > 0) text += fmt::format("  threads: {}\n", threads);
@@ -214,6 +217,11 @@ core::Result<void> fits(const Graph& graph, const MapRequest& request) {
         graph.file.string()));
   }
 
+  if (!request.rig.empty() && !any_stage(graph, &Stage::takes_rig)) {
+    return core::usage_error(fmt::format(
+        "{}: has no merge stage to join the cameras of --rig; choose another pipeline", graph.file.string()));
+  }
+
   if (graph.source().stage->reads_maps()) {
     return core::usage_error(
         fmt::format("{}: begins with finished maps; it is run by plumbline fuse", graph.file.string()));
@@ -287,6 +295,9 @@ class MapRun {
     auto source = open_inputs(request_, executor_, log_);
     if (!source) return tl::unexpected(source.error());
     source_ = std::move(*source);
+    auto rig = rig_of_run(request_.rig, source_->robots());
+    if (!rig) return tl::unexpected(rig.error());
+    rig_ = std::move(*rig);
     return can_resume(graph_, request_);
   }
 
@@ -383,6 +394,7 @@ class MapRun {
     context.input.robots = &source_->robots();
     context.input.known_map = known_map_;
     context.input.text = input_text(*source_);
+    if (rig_) context.input.rig = &*rig_;
 
     if (resumed_) context.resumed = &*resumed_;
     context.store.configuration = config_text(request_, graph_, 0);
@@ -403,6 +415,7 @@ class MapRun {
   Graph graph_;
   std::shared_ptr<const localize::LocalizationMap> known_map_;
   std::unique_ptr<RobotRecordings> source_;
+  std::optional<Rig> rig_;
   std::optional<maps::OutputFolder> output_;
   std::optional<ResumedRun> resumed_;
   std::optional<DebugFolder> debug_;
@@ -420,6 +433,12 @@ core::Result<RunSummary> map_recording(const MapRequest& given, const core::Exec
   const auto began = RunClock::now();
   const auto request = in_order(given);
   if (!request) return tl::unexpected(request.error());
+  if (!request->into.empty() && !request->rig.empty()) {
+    return core::usage_error(
+        "--rig: joins recordings of one robot's cameras; map them first, then fuse the result with the map "
+        "of "
+        "--into");
+  }
   if (!request->into.empty() && request->part == PipelinePart::kWhole)
     return map_into(*request, executor, log, stop, progress);
   MapRun run(*request, executor, log);

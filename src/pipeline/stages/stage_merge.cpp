@@ -12,12 +12,14 @@
 #include <utility>
 #include <vector>
 
+#include "plumbline/core/output_file.hpp"
 #include "plumbline/mapping/evident.hpp"
 #include "plumbline/mapping/merging/merge_server.hpp"
 #include "plumbline/maps/stored_maps.hpp"
 #include "plumbline/pipeline/meeting_log.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "robots/picked_merge.hpp"
+#include "robots/rig_merge.hpp"
 #include "robots/robot_components.hpp"
 #include "robots/robot_merge.hpp"
 #include "stages/stages.hpp"
@@ -108,6 +110,7 @@ class MergeStage : public Stage {
   [[nodiscard]] std::vector<std::string> files() const override {
     return online_ ? std::vector<std::string>{kMeetings} : std::vector<std::string>{};
   }
+  [[nodiscard]] bool takes_rig() const override { return true; }
 
   core::Result<void> start(const RunContext& context) override {
     context_ = &context;
@@ -153,6 +156,7 @@ class MergeStage : public Stage {
     summary["landmarks"] = {{"points", result.map->point_count()}, {"lines", result.lines.size()}};
     for (const RobotMerge& merge : merged_.merges) summary["merges"].push_back(section_of(merge));
     if (live_) summary["meetings"] = live_->section();
+    if (rig_) summary["rig"] = section_of(*rig_);
     for (const ComponentFate& component : components_)
       summary["components"]["list"].push_back(section_of(component));
     add(summary["path"]["refused_adjustments"], merged_.refused);
@@ -212,19 +216,35 @@ class MergeStage : public Stage {
       components_.push_back(std::move(component));
     }
   }
+  /// Merges that need no place that two maps share: by picks of a user, or by a rig.
+  core::Result<std::vector<KnownMerge>> known_merges(const std::vector<RobotMap>& maps) {
+    std::vector<KnownMerge> known;
+    if (const maps::StoredMaps* stored = context_->input.stored_maps;
+        stored != nullptr && !stored->picks().empty()) {
+      auto picked = picked_merge(*stored, maps, *context_->executor);
+      if (!picked) return tl::unexpected(picked.error());
+      known.push_back({std::move(*picked), KnownMerge::By::kPicks});
+    }
+    if (context_->input.rig == nullptr) return known;
+
+    // The poses of the cameras are a result of their own, with which the next run need not find them.
+    auto rig = rig_merge(*context_->input.rig, maps, *context_->log);
+    if (!rig) return tl::unexpected(rig.error());
+    for (mapping::MergeEvidence& merge : rig->merges)
+      known.push_back({std::move(merge), KnownMerge::By::kRig});
+    rig_ = std::move(*rig);
+    if (auto ok = core::write_file(context_->output_folder / "rig.yaml", to_yaml(*rig_)); !ok)
+      return tl::unexpected(ok.error());
+    return known;
+  }
   core::Result<void> merge(const std::vector<RobotMap>& maps) {
     std::size_t anchor = maps.size();
     if (!context_->input.anchor.empty())
       anchor = *context_->input.stored_maps->find_part(context_->input.anchor);
     if (context_->input.into) anchor = 0;
-    std::optional<mapping::MergeEvidence> picked;
-    if (const maps::StoredMaps* stored = context_->input.stored_maps;
-        stored != nullptr && !stored->picks().empty()) {
-      auto known = picked_merge(*stored, maps, *context_->executor);
-      if (!known) return tl::unexpected(known.error());
-      picked = std::move(*known);
-    }
-    merged_ = merge_robots(maps, anchor, options_, *context_->executor, *context_->log, picked);
+    const auto known = known_merges(maps);
+    if (!known) return tl::unexpected(known.error());
+    merged_ = merge_robots(maps, anchor, options_, *context_->executor, *context_->log, *known);
     for (RobotMerge& merge : merged_.merges) {
       if (live_) live_->date(merge);
     }
@@ -238,6 +258,7 @@ class MergeStage : public Stage {
   int lag_ = 10;
   std::optional<LiveMeetings> live_;
   MergedRobots merged_;
+  std::optional<RigMerge> rig_;
   std::vector<ComponentFate> components_;
 };
 

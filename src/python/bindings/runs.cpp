@@ -183,12 +183,14 @@ void add_options(py::module_& module) {
       .def_readwrite("others", &MapOptions::others)
       .def_readwrite("resume", &MapOptions::resume)
       .def_readwrite("known_map", &MapOptions::known_map)
-      .def_readwrite("into", &MapOptions::into);
+      .def_readwrite("into", &MapOptions::into)
+      .def_readwrite("rig", &MapOptions::rig);
 
   // Fusion and live mapping
   py::class_<FuseOptions, RunOptions>(module, "FuseOptions")
       .def(py::init<>())
-      .def_readwrite("anchor", &FuseOptions::anchor);
+      .def_readwrite("anchor", &FuseOptions::anchor)
+      .def_readwrite("rig", &FuseOptions::rig);
   py::class_<MapperOptions, RunOptions>(module, "MapperOptions")
       .def(py::init<>())
       .def_readwrite("name", &MapperOptions::name)

@@ -96,10 +96,12 @@ class MapOptions(RunOptions, RecordingOptions):
     resume: bool
     known_map: str
     into: str
+    rig: str
     def __init__(self) -> None: ...
 
 class FuseOptions(RunOptions):
     anchor: str
+    rig: str
     def __init__(self) -> None: ...
 
 class MapperOptions(RunOptions):

@@ -81,12 +81,14 @@ def map(  # noqa: A001, the program's name for it
     force: bool = False,
     resume: bool = False,
     into: Union[PathLike, Result, None] = None,
+    rig: Optional[PathLike] = None,
     progress: Optional[Progress] = None,
     **options: Any,
 ) -> Result:
     """Maps a recording, or several, one per robot, into a result folder: `plumbline map` as a call.
 
     into      a finished map that this is another visit of, which stays as it is
+    rig       rig.yaml: the recordings are of cameras that are fixed to each other on one robot
     progress  called with the number of frames that are done and of all frames, in this thread
     threads   0: one per core; results do not depend on it
     options   of stages: track={"loops": False} or **{"fuse.voxel": "2 cm"}
@@ -99,6 +101,8 @@ def map(  # noqa: A001, the program's name for it
     wanted.others, wanted.resume = files[1:], resume
     if into is not None:
         wanted.into = os.fspath(into.folder) if isinstance(into, Result) else path_of(into, "into")
+    if rig is not None:
+        wanted.rig = path_of(rig, "rig")
     reading(wanted, camera, format, start, end, every, poses, topics)
     run = _core.start_map(files[0], path_of(output, "output"), wanted)
     _finish(run, progress)
@@ -140,6 +144,7 @@ def fuse(
     output: PathLike,
     *,
     anchor: str = "",
+    rig: Optional[PathLike] = None,
     pipeline: PathLike = "fuse",
     threads: int = 0,
     force: bool = False,
@@ -149,10 +154,13 @@ def fuse(
     """Merges finished maps of several robots into one frame: `plumbline fuse` as a call.
 
     anchor  robot whose map defines the frame; "": the one with the largest map
+    rig     rig.yaml: the maps are of cameras that are fixed to each other on one robot
     """
     folders = [os.fspath(one.folder) if isinstance(one, Result) else path_of(one, "maps") for one in maps]
     wanted = _running(_core.FuseOptions(), pipeline, options, threads, force)
     wanted.anchor = anchor
+    if rig is not None:
+        wanted.rig = path_of(rig, "rig")
     run = _core.start_fuse(folders, path_of(output, "output"), wanted)
     _finish(run, progress)
     return Result(output)

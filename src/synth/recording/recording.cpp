@@ -306,6 +306,20 @@ Result<void> write_plan(const Scene& scene, const std::vector<std::unique_ptr<Sy
   return core::write_file(output / "plan.json", describe_plan(*scene.plan, starts, coverage));
 }
 
+/// The truth about a rig and about changes, to map with or to judge what was found.
+Result<void> write_settings(const WriteRequest& request,
+                            const std::vector<std::unique_ptr<SynthSource>>& sources) {
+  const auto& [scene, options, output] = request;
+  if (!options.changes.empty()) {
+    if (auto ok = core::write_file(output / "changes.json", describe_changes(scene)); !ok) return ok;
+  }
+  if (options.rig.empty() || sources.size() < 2) return {};
+
+  std::vector<std::string> folders;
+  for (int i = 0; i < static_cast<int>(sources.size()); ++i) folders.push_back(folder_name(i));
+  return core::write_file(output / "rig.yaml", describe_rig(sources, folders));
+}
+
 }  // namespace
 
 Result<WriteSummary> write_recordings(const WriteRequest& request, const core::Executor& executor,
@@ -348,11 +362,7 @@ Result<WriteSummary> write_recordings(const WriteRequest& request, const core::E
   }
   if (auto ok = write_plan(scene, *sources, coverage, output); !ok) return fail(ok.error());
 
-  // True changes, to judge those found.
-  if (!options.changes.empty()) {
-    if (auto ok = core::write_file(output / "changes.json", describe_changes(scene)); !ok)
-      return fail(ok.error());
-  }
+  if (auto ok = write_settings(request, *sources); !ok) return fail(ok.error());
 
   // Written last, with the state of the run.
   summary.stopped = stop.stop_requested();

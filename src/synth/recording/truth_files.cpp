@@ -50,4 +50,21 @@ std::string describe_events(const SynthSource& source) {
   return text;
 }
 
+std::string describe_rig(const std::vector<std::unique_ptr<SynthSource>>& cameras,
+                         const std::vector<std::string>& folders) {
+  std::string text = fmt::format("cameras:\n  {}: {{}}\n", folders.front());
+  const geometry::Rigid3 first_from_body = cameras.front()->body_from_camera().inverse();
+  for (std::size_t i = 1; i < cameras.size(); ++i) {
+    const geometry::Rigid3 pose = first_from_body * cameras[i]->body_from_camera();
+    const Eigen::Vector3d& t = pose.translation;
+    const Eigen::Quaterniond q = pose.quaternion();
+    text += fmt::format("  {}:\n    position: [{:.6f}, {:.6f}, {:.6f}]\n", folders[i], t.x(), t.y(), t.z());
+    text += fmt::format("    rotation: [{:.9f}, {:.9f}, {:.9f}, {:.9f}]\n", q.x(), q.y(), q.z(), q.w());
+
+    // Exact, but an edge of a graph needs a width.
+    text += "    sigma: {position: 0.5 mm, rotation: 0.02 deg}\n    time_offset: 0 s\n";
+  }
+  return text;
+}
+
 }  // namespace plumbline::synth

@@ -2,6 +2,7 @@
 #pragma once
 
 // Truth beside a recording, frame by frame.
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -14,5 +15,10 @@ std::string describe_truth(const SynthSource& source, const std::vector<double>&
 
 /// Text of events.csv.
 std::string describe_events(const SynthSource& source);
+
+/// Text of rig.yaml, as `plumbline map --rig` reads it: the cameras of one body relative to the first one.
+/// `folders`: names of their recordings.
+std::string describe_rig(const std::vector<std::unique_ptr<SynthSource>>& cameras,
+                         const std::vector<std::string>& folders);
 
 }  // namespace plumbline::synth

@@ -208,6 +208,29 @@ std::string feedback_html(const Json& summary) {
          note(text_at(summary, "/feedback/note"));
 }
 
+/// Cameras that are fixed to each other on one robot: their poses, and the evidence of those that were found.
+std::string rig_html(const Json& summary) {
+  const Json& cameras = list_at(summary, "/rig/cameras");
+  if (cameras.empty()) return {};
+  JsonTable table({{"camera", "{/name:text}"},
+                   {"pose", "{/pose:text}"},
+                   {">x", "{/position/0:1 mm}"},
+                   {">y", "{/position/1:1 mm}"},
+                   {">z", "{/position/2:1 mm}"},
+                   {">± x", "{/sigma_position_m/0:1 mm}"},
+                   {">± y", "{/sigma_position_m/1:1 mm}"},
+                   {">± z", "{/sigma_position_m/2:1 mm}"},
+                   {">motions", "{/motions}"},
+                   {">off", "{/residual_m:1 mm}"},
+                   {">pairs", "{/pairs}"}});
+
+  for (const Json& camera : cameras) table.row(camera);
+  return "<h3>Cameras of one robot</h3>\n" + table.html() +
+         note(filled(summary,
+                     "Places are in the axes of {/rig/reference:text} (x right, y down, z ahead). Off: "
+                     "by which the motions of both over 1 s differ. Pairs: keyframes that are tied."));
+}
+
 }  // namespace
 
 std::string loops_html(const ReportData& data) { return closings_html(data) + feedback_html(data.summary); }
@@ -233,12 +256,13 @@ std::string merges_html(const ReportData& data) {
   for (const Json& m : list) {
     const bool accepted = flag_at(m, "/accepted");
     const std::string names = filled(m, "{/a:text} and {/b:text}");
-    overview.row(m, {names, accepted ? "merged" : "not merged"}, accepted ? "yes" : "bad");
+    const char* how = text_at(m, "/by") == "rig" ? "one robot" : "merged";
+    overview.row(m, {names, accepted ? how : "not merged"}, accepted ? "yes" : "bad");
     details +=
         folded("Evidence: " + names, merge_evidence(m) + refused_pairs(m), list.size() <= kShownMerges);
   }
 
-  return overview.html() + details +
+  return rig_html(data.summary) + overview.html() + details +
          note(
              "Log-odds (natural logarithm) of the aligned keyframes' pictures: that both maps "
              "show one place rather than two, and that it is this place rather than one like it.");
