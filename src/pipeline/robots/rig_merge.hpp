@@ -21,7 +21,7 @@ struct RigPlace {
   bool found = false;      ///< from the motions; else as given
   double time_offset_s = 0.0;
   const char* offset_is = "none";  ///< "given", "found"
-  std::size_t pairs = 0;  ///< pairs of keyframes that tie its map to the reference camera's
+  std::size_t pairs = 0;           ///< pairs of keyframes that tie its map to the reference camera's
 };
 
 struct RigMerge {
