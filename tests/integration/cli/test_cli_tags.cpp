@@ -16,10 +16,8 @@
 namespace plumbline::integration {
 namespace {
 
-constexpr double kBound = 0.003;
-
 /// Walls near enough to the camera for tags in small pictures.
-constexpr const char* kRoom = R"(name: small
+constexpr const char* kTagRoom = R"(name: small
 objects:
   - floor: {from: [-0.1, -0.1], to: [3.4, 3.1], material: planks}
   - ceiling: {from: [-0.1, -0.1], to: [3.4, 3.1], height: 2.5}
@@ -43,7 +41,7 @@ robots:
 )";
 
 /// A row of tags.csv.
-struct Row {
+struct TagRow {
   Eigen::Vector3d at;
   double sigma = 0.0;
   int keyframes = 0;
@@ -52,8 +50,10 @@ struct Row {
 
 class Tags : public ProgramTest {
  protected:
+  static constexpr double kScaleBound = 0.003;
+
   void SetUp() override {
-    write("small.yaml", kRoom);
+    write("small.yaml", kTagRoom);
     const Outcome filmed =
         run("synth small.yaml -o world --tags 6 --tag-copies 1 --frames 100 --fps 6 --width 320 --height 240 "
             "--reference-spacing 10cm -q");
@@ -91,15 +91,15 @@ class Tags : public ProgramTest {
                more);
   }
 
-  [[nodiscard]] std::map<int, Row> rows_of(const std::string& result) const {
-    std::map<int, Row> rows;
+  [[nodiscard]] std::map<int, TagRow> rows_of(const std::string& result) const {
+    std::map<int, TagRow> rows;
     std::istringstream lines(slurp(path(result) / "tags.csv"));
     std::string line;
     std::getline(lines, line);
     EXPECT_EQ(line, "tag,x,y,z,sigma,keyframes,used");
     while (std::getline(lines, line)) {
       int tag = 0, used = 0;
-      Row row;
+      TagRow row;
       EXPECT_EQ(std::sscanf(line.c_str(), "%d,%lf,%lf,%lf,%lf,%d,%d", &tag, &row.at.x(), &row.at.y(),
                             &row.at.z(), &row.sigma, &row.keyframes, &used),
                 7)
@@ -167,7 +167,7 @@ TEST_F(Tags, LengthsBringScaleAndACopySaysNothing) {
   ASSERT_GT(scale_off("m"), 0.03);
   const Outcome found = adjust("found", "family: 36h11\n");
   ASSERT_EQ(found.code, 0) << found;
-  const std::map<int, Row> rows = rows_of("found");
+  const std::map<int, TagRow> rows = rows_of("found");
   ASSERT_EQ(rows.count(0), 1U);
   EXPECT_FALSE(rows.at(0).used);
   EXPECT_TRUE(found.told("tag 0: is at several places, a copy")) << found;
@@ -193,7 +193,7 @@ TEST_F(Tags, LengthsBringScaleAndACopySaysNothing) {
       fmt::format("control:\n  - {{tags: [{}, {}], length: {:.4f} m}}\n", a, b, longest);
   const Outcome scaled = adjust("scaled", length);
   ASSERT_EQ(scaled.code, 0) << scaled;
-  EXPECT_LT(scale_off("scaled"), kBound);
+  EXPECT_LT(scale_off("scaled"), kScaleBound);
   EXPECT_TRUE(scaled.told(fmt::format("tags {} to {}", a, b))) << scaled;
   expect_in_place("scaled");
 
@@ -226,7 +226,7 @@ TEST_F(Tags, WorldCoordinatesBringScaleAndPlace) {
 
   const Outcome placed = adjust("placed", control, " --epsg 25832");
   ASSERT_EQ(placed.code, 0) << placed;
-  EXPECT_LT(scale_off("placed"), kBound);
+  EXPECT_LT(scale_off("placed"), kScaleBound);
   EXPECT_FALSE(placed.told("BLUNDER")) << placed;
   expect_in_place("placed");
 
