@@ -40,8 +40,8 @@ struct FrameRow {
   std::size_t frame = 0;  ///< number within the run
   FrameState state = FrameState::kLost;
   std::string
-      columns;         ///< the rest, comma-separated, as MapResult::frame_columns names it; for the file only
-  std::string reason;  ///< why it has no pose; "": it has one
+      columns;  ///< the rest, comma-separated, as MapResult::frame_columns names it; for the file only
+  std::string reason{};        ///< why it has no pose; "": it has one
   bool shows_nothing = false;  ///< hardly any depth, or a picture without contrast and corners
   bool blind = false;          ///< lost, and one of three or more in a row that show nothing
 };
