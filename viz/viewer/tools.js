@@ -139,10 +139,10 @@ class Measuring {
   }
 
   text() { return this.list.map((m) => m.text + this.flagOf(m)).join('\n'); }
-  /** A distance as `plumbline adjust` takes it, to be corrected to what a tape says. */
+  /** A distance as `adjust` takes it. */
   flagOf({ tool, points, value }) {
     const at = ({ p }) => `"${this.view.ofMap(p).map((v) => v.toFixed(4)).join(',')}"`;
-    return tool === 'distance' && points.length === 2 ? `\n  --length ${at(points[0])} ${at(points[1])} ${value.toFixed(4)}m` : '';
+    return tool === 'distance' && points[1] ? `\n  --length ${at(points[0])} ${at(points[1])} ${value.toFixed(4)}m` : '';
   }
 }
 

@@ -111,9 +111,8 @@ TEST_F(Exports, AllPathsAreOneAndRunsWriteTheirExports) {
   EXPECT_EQ(run("export out -o late.las").code, 0);
 }
 
-/// The recording is gone: models have the pictures that the map keeps.
 TEST_F(Exports, TheBaseOfABagHasAPath) {
-  ASSERT_EQ(run("synth room -o world --frames 30 --seed 1 --odometry ideal --mcap on -q").code, 0);
+  ASSERT_EQ(run("synth room -o world --frames 30 --seed 1 --odometry ideal --out-format mcap -q").code, 0);
   ASSERT_EQ(run("map world/robot0/recording.mcap -o out -q --set output.views=").code, 0);
   ASSERT_EQ(run("export out -o base.txt --what trajectory --body base").code, 0);
   ASSERT_EQ(run("export out -o camera.txt --what trajectory").code, 0);
@@ -128,6 +127,7 @@ TEST_F(Exports, TheBaseOfABagHasAPath) {
   EXPECT_LT(((*base)[7].world_from_camera.rotation.col(2) + ahead.col(1)).norm(), 1e-5);
 }
 
+/// The recording is gone: models have the pictures that the map keeps.
 TEST_F(Exports, KeptPicturesReplaceARecordingThatIsGone) {
   ASSERT_EQ(run("synth room -o world --frames 60 --width 320 --height 240 -q").code, 0);
   const Outcome mapped = run("map world/robot0 -o out -q --set store.images=whole --set output.views=");
