@@ -59,14 +59,28 @@ std::vector<Eigen::Vector3d> placed(const PlaceViews& seen, const maps::StoredMa
   return places;
 }
 
+constexpr double kOnePlace_m = 0.3;
+
+/// True if two of the places that are far from `at` are one.
+bool elsewhere_too(const std::vector<Eigen::Vector3d>& places, const Eigen::Vector3d& at) {
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if ((places[i] - at).norm() <= kOnePlace_m) continue;
+    for (std::size_t j = 0; j < i; ++j) {
+      if ((places[j] - at).norm() > kOnePlace_m && (places[j] - places[i]).norm() <= kOnePlace_m) return true;
+    }
+  }
+
+  return false;
+}
+
 Tag tag_of(int id, const PlaceViews& seen, const maps::StoredMap& map) {
-  constexpr double kOnePlace_m = 0.3;
   constexpr double kLeast_m = 0.002;
   Tag tag;
   tag.id = id;
   const std::vector<Eigen::Vector3d> places = placed(seen, map, 1.0);
 
-  // Views far from the median see a copy of the tag, or read another tag's number.
+  // Views far from the median see a copy of the tag, or read another tag's number: a copy if two of them
+  // agree, or if they are many.
   const Eigen::Vector3d median = median_of(places);
   double squares = 0.0;
   for (std::size_t i = 0; i < places.size(); ++i) {
@@ -77,7 +91,7 @@ Tag tag_of(int id, const PlaceViews& seen, const maps::StoredMap& map) {
   }
 
   const std::size_t far = seen.size() - tag.seen.size();
-  tag.copied = tag.seen.empty() || 5 * far > seen.size();
+  tag.copied = tag.seen.empty() || 5 * far > seen.size() || elsewhere_too(places, median);
   const auto count = static_cast<double>(std::max<std::size_t>(1, tag.seen.size()));
   tag.at = tag.seen.empty() ? median : Eigen::Vector3d(tag.at / count);
   tag.sigma_m = std::max(kLeast_m, std::sqrt(squares) / count);
