@@ -30,7 +30,7 @@ class LocalizeStage : public Stage {
   [[nodiscard]] bool knows_map() const override { return true; }
 
   core::Result<void> start(const RunContext& context) override {
-    using Clock = std::chrono::steady_clock;
+    using SteadyClock = std::chrono::steady_clock;
     context_ = &context;
     map_ = context.input.known_map;
     RobotRecordings& recordings = *context.input.recordings;
@@ -43,9 +43,9 @@ class LocalizeStage : public Stage {
       camera.readout_s = refined->readout_s;
       refined_ = true;
     }
-    const auto began = Clock::now();
+    const auto began = SteadyClock::now();
     localizer_.emplace(*map_, camera, options_);
-    start_s_ = std::chrono::duration<double>(Clock::now() - began).count();
+    start_s_ = std::chrono::duration<double>(SteadyClock::now() - began).count();
     return {};
   }
 
