@@ -109,9 +109,8 @@ tl::unexpected<core::Error> open_pose(const Rig& rig, const RigCamera& camera,
 
   return core::input_error(fmt::format(
       "{}the motion does not show its position along {} in the axes of {}: the robot turned about that axis "
-      "only; tilt it as well, or measure this offset and give it with its sigma, like position: [0, 0.12, "
-      "0], "
-      "sigma: {{position: [10 m, 5 mm, 10 m]}}",
+      "only; tilt it as well, or measure this offset and give it with its sigma, such as "
+      "position: [0, 0.12, 0], sigma: {{position: [10 m, 5 mm, 10 m]}}",
       place, axis_text(found.free_positions.front()), reference));
 }
 
