@@ -142,7 +142,7 @@ class Measuring {
   /** A distance as `adjust` takes it. */
   flagOf({ tool, points, value }) {
     const at = ({ p }) => `"${this.view.ofMap(p).map((v) => v.toFixed(4)).join(',')}"`;
-    return tool === 'distance' && points[1] ? `\n  --length ${at(points[0])} ${at(points[1])} ${value.toFixed(4)}m` : '';
+    return tool === 'distance' && points[1] ? `\n  --length ${points.map(at).join(' ')} ${value.toFixed(4)}m` : '';
   }
 }
 
