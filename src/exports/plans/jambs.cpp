@@ -119,16 +119,34 @@ void measure_head(const NearPoints& points, WallDoor& door) {
   if (const std::optional<double> head = main_place(heights)) door.head_m = *head;
 }
 
+/// The height of what faces up in the opening, from the floor to a parapet.
+void measure_sill(const NearPoints& points, WallDoor& door) {
+  constexpr double kHighest_m = 1.3;
+  constexpr double kThreshold_m = 0.06;
+  const double depth = std::max(0.1, (door.far_jambs[0] - door.jambs[0]).norm());
+  std::vector<double> heights;
+  for (std::size_t i = 0; i < points.places.size(); ++i) {
+    const Eigen::Vector3d& p = points.places[i];
+    if (points.normals[i].z() > 0.8 && p.x() > 0.05 && p.x() < door.width_m - 0.05 && p.y() < 0.0 &&
+        p.y() > -depth && p.z() < kHighest_m)
+      heights.push_back(p.z());
+  }
+  const std::optional<double> sill = main_place(heights);
+  if (sill && *sill > kThreshold_m) door.sill_m = *sill;
+}
+
 }  // namespace
 
-/// Measures clear width and head of doors; wide or high ones are passages.
+/// Measures clear width, head and sill of doors; wide or high ones are passages, those over a sill windows.
 void measure_doors(const cloud::Cloud& cloud, double floor_m, std::vector<WallDoor>& doors) {
   constexpr double kWidestLeaf_m = 1.3;
   for (WallDoor& door : doors) {
     const NearPoints points = points_near(cloud, floor_m, door);
     measure_jambs(points, door);
     measure_head(points_near(cloud, floor_m, door), door);
+    measure_sill(points_near(cloud, floor_m, door), door);
     if (door.width_m > kWidestLeaf_m || door.head_m > 2.3) door.kind = OpeningKind::kPassage;
+    if (door.sill_m > 0.0) door.kind = OpeningKind::kWindow;
   }
 }
 

@@ -24,14 +24,28 @@ bool open_column(const WallRaster& raster, int column, const Cut& cut) {
   return raster.seen(column, 0.25, 0.8) <= kMost && raster.seen(column, cut.low_m, cut.high_m) <= kMost;
 }
 
-/// True if cameras looked through; if the rays are not known, true if there is a lintel above. Doors are such
-/// openings, too: measure_doors() distinguishes OpeningKind::kPassage by width and head.
+/// True if cameras looked through, also below the sills of windows, which what stands before them hides; if
+/// the rays are not known, true if there is a lintel above. Doors are such openings, too: measure_doors()
+/// distinguishes OpeningKind::kPassage by width and head.
 bool is_passage(const WallRaster& raster, int a, int b, const Cut& cut) {
   constexpr double kLeastCrossed = 0.08;
   constexpr double kLeastLintel = 0.3;
-  if (cut.rays_known)
-    return mean_share(a, b, [&](int c) { return raster.crossed(c, 0.3, 1.9); }) >= kLeastCrossed;
+  const auto crossed = [&](double low_m, double high_m) {
+    return mean_share(a, b, [&](int c) { return raster.crossed(c, low_m, high_m); });
+  };
+  if (cut.rays_known) return crossed(0.3, 1.9) >= kLeastCrossed && crossed(0.2, 0.8) >= kLeastCrossed;
   return mean_share(a, b, [&](int c) { return raster.seen(c, 2.15, 2.5); }) >= kLeastLintel;
+}
+
+/// Narrows a run of columns to those that cameras looked through: a sliding leaf before the wall hides the
+/// part beside its opening, which shows no surface either.
+void trim_hidden(const WallRaster& raster, const Cut& cut, int& a, int& b) {
+  const auto is_hidden = [&](int c) {
+    return raster.hidden(c, 0.3, 1.9) > raster.crossed(c, 0.3, 1.9) && raster.crossed(c, 0.3, 1.9) < 0.08;
+  };
+  if (!cut.rays_known) return;
+  while (a < b && is_hidden(a)) ++a;
+  while (b > a && is_hidden(b)) --b;
 }
 
 /// An opening up to where its wall begins: leaves and frames reach a little into it.
@@ -40,6 +54,12 @@ WallOpening widened(const WallRaster& raster, const WallLine& wall, WallOpening 
   const int last = raster.column_at(wall.at(opening.s1));
   int a = first;
   int b = last;
+  trim_hidden(raster, cut, a, b);
+  if (a > first || b < last) {
+    opening.s0 += (a - first) * WallRaster::kWidth_m;
+    opening.s1 -= (last - b) * WallRaster::kWidth_m;
+    return opening;
+  }
   while (a > 0 && open_column(raster, a - 1, cut) && raster.start_of(b) - raster.start_of(a) < kWidestDoor_m)
     --a;
   while (b + 1 < raster.columns() && open_column(raster, b, cut) &&
@@ -128,10 +148,12 @@ std::vector<WallOpening> openings_between(const WallRaster& raster, double s0, d
 
   // Widths of doors only
   std::vector<WallOpening> openings;
-  for (const auto& [a, b] : runs) {
+  for (auto [a, b] : runs) {
+    trim_hidden(raster, cut, a, b);
     const WallOpening opening{raster.start_of(a), raster.start_of(b + 1)};
     const double width = opening.s1 - opening.s0;
-    if (width >= kNarrowestDoor_m && width <= kWidestDoor_m && is_passage(raster, a, b, cut))
+    const double widest = cut.rays_known ? kWidestPassage_m : kWidestDoor_m;
+    if (width >= kNarrowestDoor_m && width <= widest && is_passage(raster, a, b, cut))
       openings.push_back(opening);
   }
 
@@ -140,7 +162,7 @@ std::vector<WallOpening> openings_between(const WallRaster& raster, double s0, d
 
 /// Joins pieces of walls in line, over a door or a hidden part.
 void bridge_gaps(std::vector<WallLine>& walls, std::vector<Fronts>& fronts, const Cut& cut) {
-  constexpr double kLongest_m = 1.6;
+  constexpr double kLongest_m = 1.6;  // of wall that was hidden
   constexpr double kSameLine_m = 0.025;
   for (std::size_t i = 0; i < walls.size(); ++i) {
     for (std::size_t j = 0; j < walls.size(); ++j) {
@@ -151,14 +173,14 @@ void bridge_gaps(std::vector<WallLine>& walls, std::vector<Fronts>& fronts, cons
       // Pieces in line with a short gap
       const double from = a.along().dot(b.at(b.s0));
       const double gap = from - a.s1;
-      if (gap <= 0.0 || gap > kLongest_m || std::abs(a.normal.dot(b.at(b.s0)) - a.offset_m) > kSameLine_m)
+      if (gap <= 0.0 || gap > kWidestDoor_m || std::abs(a.normal.dot(b.at(b.s0)) - a.offset_m) > kSameLine_m)
         continue;
 
       // Cameras that saw through make it an opening
       const WallRaster& front = *fronts[i].last;
       const bool crossed = is_passage(front, front.column_at(a.at(a.s1)), front.column_at(b.at(b.s0)),
                                       {cut.at_m, cut.low_m, cut.high_m, true});
-      if (crossed && gap < kNarrowestDoor_m) continue;
+      if (crossed ? gap < kNarrowestDoor_m : gap > kLongest_m) continue;
 
       // An opening, else hidden wall with its gaps
       if (crossed || !cut.rays_known) {

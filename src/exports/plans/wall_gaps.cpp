@@ -134,4 +134,33 @@ void drop_gaps_at_doors(WallLine& wall) {
   wall.gaps.erase(std::remove_if(wall.gaps.begin(), wall.gaps.end(), is_door), wall.gaps.end());
 }
 
+void take_back_doors(std::vector<WallDoor>& doors, std::vector<WallLine>& walls) {
+  constexpr double kSquare = 0.05, kOff_m = 0.04;
+  const auto is_none = [](const WallDoor& door) {
+    return door.kind == OpeningKind::kWindow ||
+           (door.width_m > kWidestDoor_m && !(door.jamb_seen[0] && door.jamb_seen[1]));
+  };
+
+  // Openings of the faces become gaps
+  for (const WallDoor& door : doors) {
+    if (!is_none(door)) continue;
+    const Eigen::Vector2d way = (door.jambs[1] - door.jambs[0]).normalized();
+    for (WallLine& wall : walls) {
+      const bool on_near = std::abs(wall.normal.dot(door.jambs[0]) - wall.offset_m) < kOff_m;
+      const bool on_far = std::abs(wall.normal.dot(door.far_jambs[0]) - wall.offset_m) < kOff_m;
+      if (std::abs(wall.normal.dot(way)) > kSquare || (!on_near && !on_far)) continue;
+      const auto [s0, s1] = std::minmax({wall.along().dot(door.jambs[0]), wall.along().dot(door.jambs[1])});
+      const auto first_of = std::stable_partition(
+          wall.openings.begin(), wall.openings.end(), [&, low = s0, high = s1](const WallOpening& part) {
+            return std::min(part.s1, high) - std::max(part.s0, low) <= 0.5 * (part.s1 - part.s0);
+          });
+      wall.gaps.insert(wall.gaps.end(), first_of, wall.openings.end());
+      wall.openings.erase(first_of, wall.openings.end());
+      std::sort(wall.gaps.begin(), wall.gaps.end(),
+                [](const WallOpening& a, const WallOpening& b) { return a.s0 < b.s0; });
+    }
+  }
+  doors.erase(std::remove_if(doors.begin(), doors.end(), is_none), doors.end());
+}
+
 }  // namespace plumbline::exports

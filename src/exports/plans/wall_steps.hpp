@@ -29,7 +29,8 @@ struct Fronts {
 };
 
 constexpr double kNarrowestDoor_m = 0.55;
-constexpr double kWidestDoor_m = 1.6;
+constexpr double kWidestDoor_m = 2.0;     ///< of two leaves
+constexpr double kWidestPassage_m = 3.0;  ///< of which both jambs were seen, else it is a gap
 constexpr double kThickestWall_m = 0.45;
 
 /// The height of the cut over the floor, metres, and the heights between which a column must be free to be
@@ -48,6 +49,9 @@ void cut_sides(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, c
 std::vector<WallOpening> gaps_between(const WallRaster& raster, double s0, double s1, const Cut& cut);
 /// Drops gaps that are doors.
 void drop_gaps_at_doors(WallLine& wall);
+/// Makes gaps of openings that proved to be no doors when they were measured: windows, and wide ones of which
+/// a jamb was not seen.
+void take_back_doors(std::vector<WallDoor>& doors, std::vector<WallLine>& walls);
 
 /// Openings between two places of a side.
 std::vector<WallOpening> openings_between(const WallRaster& raster, double s0, double s1, const Cut& cut);

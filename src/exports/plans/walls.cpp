@@ -85,7 +85,8 @@ std::vector<WallLine> close_free_ends(const cloud::Cloud& cloud, double floor_m,
     });
 
     // Both jambs must have been seen
-    if (!again && m.jamb_seen[0] && m.jamb_seen[1] && m.width_m > kNarrowestDoor_m) {
+    if (!again && m.kind != OpeningKind::kWindow && m.jamb_seen[0] && m.jamb_seen[1] &&
+        m.width_m > kNarrowestDoor_m) {
       plan.doors.push_back(m);
     } else {
       closings.push_back(closing_of(door));
@@ -193,6 +194,7 @@ void add_doors(const PlanCloud& of, const std::vector<Fronts>& fronts, const Cut
   plan.doors.insert(plan.doors.end(), more.begin(), more.end());
   find_far_sides(plan.walls, plan.doors);
   measure_doors(of.points, of.floor_m, plan.doors);
+  take_back_doors(plan.doors, plan.walls);
 }
 
 /// Rooms of the free space between walls and closed doors; such rooms need not have a wall all around.

@@ -98,7 +98,7 @@ void fit_sides(const cloud::Cloud& cloud, double floor_m, const core::Executor& 
 void join_corners(std::vector<WallLine>& walls);
 /// Rooms where it is not known what cameras looked through: chains of walls that meet all round.
 std::vector<WallRoom> rooms_of(const std::vector<WallLine>& walls);
-/// Jambs, heads and kinds of doors.
+/// Jambs, heads, sills and kinds of doors.
 void measure_doors(const cloud::Cloud& cloud, double floor_m, std::vector<WallDoor>& doors);
 /// Heights of rooms whose ceilings were seen.
 void measure_heights(const cloud::Cloud& cloud, double floor_m, std::vector<WallRoom>& rooms);

@@ -8,6 +8,7 @@
 
 #include "exports/export_test.hpp"
 #include "plans/room_cells.hpp"
+#include "plans/wall_steps.hpp"
 
 namespace plumbline::exports {
 namespace {
@@ -345,6 +346,44 @@ std::vector<WallRoom> room_seen_up_to(double y) {
     space.add(rays);
   }
   return rooms_in(box, walls, {}, {}, space);
+}
+
+/// The face, at y = 0 and seen from y > 0, of a wall of 4 m with a hole from 1 m to 1 m + `width`. Cameras
+/// look through the hole above `sill_m`; what stands before it hides what is lower, and `leaf_m` of the hole
+/// beside.
+WallRaster wall_with_hole(double width, double sill_m, double leaf_m) {
+  WallRaster raster(Eigen::Vector2d::UnitY(), 0.0, -4.0, 0.0, 0.0);  // s = -x
+  for (double x = 0.01; x < 4.0; x += 0.01) {
+    for (double z = 0.025; z < 2.5; z += 0.025) {
+      const bool hole = x > 1.0 && x < 1.0 + width && z < 2.05;
+      const bool hidden = hole && (z < sill_m || x > 1.0 + width - leaf_m);
+      if (!hole) raster.add_surface({x, 0.0, z});
+      ViewRays ray;
+      ray.origin = {x, 1.0, z};
+      ray.ends = {Eigen::Vector3d(x, hidden ? 0.06 : -1.0, z).cast<float>()};
+      if (hole) raster.add_rays(ray);
+    }
+  }
+  return raster;
+}
+
+TEST(PlanOpenings, AreOpenBelowSillsToo) {
+  const Cut cut{1.2, 0.9, 2.0, true};
+  EXPECT_EQ(openings_between(wall_with_hole(0.9, 0.0, 0.0), -4.0, 0.0, cut).size(), 1U);
+  EXPECT_TRUE(
+      openings_between(wall_with_hole(0.9, 0.85, 0.0), -4.0, 0.0, cut).empty());  // a bed before a window
+}
+
+TEST(PlanOpenings, MayBeWiderThanDoors) {
+  const Cut cut{1.2, 0.9, 2.0, true};
+  EXPECT_EQ(openings_between(wall_with_hole(2.6, 0.0, 0.0), -4.0, 0.0, cut).size(), 1U);
+}
+
+TEST(PlanOpenings, EndWhereASlidingLeafHidesTheWall) {
+  const Cut cut{1.2, 0.9, 2.0, true};
+  const auto found = openings_between(wall_with_hole(1.7, 0.0, 0.8), -4.0, 0.0, cut);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_NEAR(found.front().s1 - found.front().s0, 0.9, 0.05);
 }
 
 TEST(PlanRooms, CloseOverShortGapsOnly) {
