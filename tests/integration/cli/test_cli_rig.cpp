@@ -24,14 +24,12 @@ class Rig : public ProgramTest {
       " -q --set output.views= --set output.pcd=off --set cloud.filters=[] --set fuse.voxel=3cm";
 
   /// Two cameras back to back, filmed while they are carried through a room.
-  void film(const std::string& options = "", const std::string& scene = "room") const {
+  void film(const std::string& options, const std::string& scene = "room") const {
     write("body.yaml",
           "cameras:\n  - {at: [0, 0, 0]}\n  - {at: [-0.1, 0.02, 0.03], yaw: 176 deg, pitch: 4 deg}\n");
     write("unknown.yaml", "cameras: {robot0: {}, robot1: {}}\n");
-    const Outcome filmed = run("synth " + scene +
-                               " -o world --rig body.yaml --frames 240 --fps 10 --width 320 --height 240 "
-                               "--reference-spacing 5cm -q " +
-                               options);
+    const Outcome filmed =
+        run("synth " + scene + " -o world --rig body.yaml --fps 10 --reference-spacing 5cm -q " + options);
     ASSERT_EQ(filmed.code, 0) << filmed;
   }
   /// robot0_from_robot1
@@ -54,7 +52,7 @@ class Rig : public ProgramTest {
     ASSERT_TRUE(a.has_value() && b.has_value());
     int common = 0;
     for (const auto& pose : *b) {
-      const auto at = geometry::pose_at(*a, pose.stamp, 0.001);
+      const auto at = geometry::pose_at(*a, pose.stamp, 0.15);
       if (!at) continue;
       ++common;
       const Rigid3 follows = *at * truth();
@@ -75,9 +73,9 @@ class Rig : public ProgramTest {
 };
 
 TEST_F(Rig, CamerasBackToBackAreFoundFromTheirMotion) {
-  film();
-  const Outcome one = run("map world/robot0 world/robot1 --rig unknown.yaml -o one --threads 1" +
-                          std::string(kLean).replace(0, 3, ""));
+  film("--frames 240 --width 480 --height 360");
+  const Outcome one =
+      run("map world/robot0 world/robot1 --rig unknown.yaml -o one" + std::string(kLean).replace(0, 3, ""));
   ASSERT_EQ(one.code, 0) << one;
   EXPECT_TRUE(one.told("rig: robot1 is")) << one;
   EXPECT_TRUE(one.told("are cameras of one rig")) << one;
@@ -96,18 +94,10 @@ TEST_F(Rig, CamerasBackToBackAreFoundFromTheirMotion) {
   // Both look at different sides of the room from the same path.
   ASSERT_EQ(run("map world/robot0 -o alone" + std::string(kLean)).code, 0);
   EXPECT_GT(recall("one", "robots/robot0/trajectory.txt"), 1.5 * recall("alone", "trajectory.txt"));
-
-  // The order of the recordings and the threads leave no trace.
-  ASSERT_EQ(
-      run("map world/robot1 world/robot0 --rig unknown.yaml -o two --threads 2" + std::string(kLean)).code,
-      0);
-  for (const char* file :
-       {"map.ply", "rig.yaml", "robots/robot0/trajectory.txt", "robots/robot1/trajectory.txt"})
-    EXPECT_EQ(slurp(path("one") / file), slurp(path("two") / file)) << file;
 }
 
 TEST_F(Rig, FinishedMapsWithAGivenPose) {
-  film();
+  film("--frames 240 --width 320 --height 240");
   for (const char* robot : {"0", "1"}) {
     const Outcome mapped = run(std::string("map world/robot") + robot + " -o robot" + robot + kLean);
     ASSERT_EQ(mapped.code, 0) << mapped;
@@ -119,11 +109,15 @@ TEST_F(Rig, FinishedMapsWithAGivenPose) {
   EXPECT_EQ(read_json(path("both/summary.json"))["rig"]["cameras"][0]["pose"], "given");
   expect_one_frame("both");
 
-  // The result's own file gives the same map again.
-  const Outcome again = run("fuse robot1 robot0 --rig both/rig.yaml -o again -q" + lean);
+  // The order of the maps and the threads leave no trace; the result's own file can be given, too.
+  const Outcome turned = run("fuse robot1 robot0 --rig world/rig.yaml -o turned --threads 1 -q" + lean);
+  ASSERT_EQ(turned.code, 0) << turned;
+  for (const char* file :
+       {"map.ply", "rig.yaml", "robots/robot0/trajectory.txt", "robots/robot1/trajectory.txt"})
+    EXPECT_EQ(slurp(path("both") / file), slurp(path("turned") / file)) << file;
+  const Outcome again = run("fuse robot0 robot1 --rig both/rig.yaml -o again -q" + lean);
   ASSERT_EQ(again.code, 0) << again;
   EXPECT_EQ(slurp(path("both/rig.yaml")), slurp(path("again/rig.yaml")));
-  EXPECT_EQ(slurp(path("both/map.ply")), slurp(path("again/map.ply")));
 
   // A pose the other way round is noticed.
   const Rigid3 inverse = truth().inverse();
@@ -146,7 +140,7 @@ TEST_F(Rig, WheelsNeedTheHeightBetweenTheCameras) {
                            "    height: 1.2\n    pitch: -8 deg\n    path:\n"
                            "      - {at: [3.4, 1.0]}\n      - {at: [3.6, 2.0]}\n      - {at: [3.0, 2.8]}\n"
                            "      - {at: [2.4, 2.4]}\n      - {at: [2.3, 1.4]}\n      - {at: [2.8, 0.9]}\n");
-  film("--motion wheeled", "wheels.yaml");
+  film("--frames 240 --width 320 --height 240 --motion wheeled", "wheels.yaml");
   const Outcome open = run("map world/robot0 world/robot1 --rig unknown.yaml -o open" + std::string(kLean));
   EXPECT_EQ(open.code, 3) << open;
   EXPECT_TRUE(open.told("the motion does not show its position along")) << open;
@@ -163,7 +157,7 @@ TEST_F(Rig, WheelsNeedTheHeightBetweenTheCameras) {
 }
 
 TEST_F(Rig, MistakesOfTheCommandLine) {
-  film("--frames 12");
+  film("--frames 12 --width 320 --height 240");
   const std::string lean = kLean;
   const Outcome alone = run("map world/robot0 --rig unknown.yaml -o out" + lean);
   EXPECT_EQ(alone.code, 2) << alone;
