@@ -79,8 +79,7 @@ TEST_F(Rig, CamerasBackToBackAreFoundFromTheirMotion) {
   ASSERT_EQ(one.code, 0) << one;
   EXPECT_TRUE(one.told("rig: robot1 is")) << one;
   EXPECT_TRUE(one.told("are cameras of one rig")) << one;
-  // Small pictures for 24 s: the height is known worst, since the camera hardly tilts.
-  EXPECT_LT((told("one").translation - truth().translation).norm(), 0.008);
+  EXPECT_LT((told("one").translation - truth().translation).norm(), 0.005);
   EXPECT_LT(geometry::rotation_angle(told("one").rotation.transpose() * truth().rotation),
             0.2 * M_PI / 180.0);
   expect_one_frame("one");
