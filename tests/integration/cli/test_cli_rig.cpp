@@ -3,6 +3,7 @@
 #include <cmath>
 #include <string>
 
+#include "plumbline/core/numbers.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/geometry/rigid3.hpp"
 #include "program.hpp"
@@ -50,17 +51,20 @@ class Rig : public ProgramTest {
     const auto a = dataset::read_trajectory(path(result) / "robots/robot0/trajectory.txt");
     const auto b = dataset::read_trajectory(path(result) / "robots/robot1/trajectory.txt");
     ASSERT_TRUE(a.has_value() && b.has_value());
-    int common = 0;
+    std::vector<double> off_m, off_rad;
     for (const auto& pose : *b) {
       const auto at = geometry::pose_at(*a, pose.stamp, 0.15);
       if (!at) continue;
-      ++common;
       const Rigid3 follows = *at * truth();
-      EXPECT_LT((follows.translation - pose.world_from_camera.translation).norm(), 0.02);
-      EXPECT_LT(geometry::rotation_angle(follows.rotation.transpose() * pose.world_from_camera.rotation),
-                0.01);
+      off_m.push_back((follows.translation - pose.world_from_camera.translation).norm());
+      off_rad.push_back(
+          geometry::rotation_angle(follows.rotation.transpose() * pose.world_from_camera.rotation));
     }
-    EXPECT_GT(common, 200);
+
+    // Between two frames of a fast turn the interpolated pose itself is off.
+    ASSERT_GT(10 * off_m.size(), 8 * b->size());
+    EXPECT_LT(core::quantile(off_m, 0.95), 0.02);
+    EXPECT_LT(core::quantile(off_rad, 0.95), 0.01);
   }
   /// Share of what the cameras could see that is in the cloud.
   [[nodiscard]] double recall(const std::string& result, const std::string& path_in_it) const {
@@ -97,7 +101,7 @@ TEST_F(Rig, CamerasBackToBackAreFoundFromTheirMotion) {
 }
 
 TEST_F(Rig, FinishedMapsWithAGivenPose) {
-  film("--frames 240 --width 320 --height 240");
+  film("--frames 120 --width 320 --height 240");
   for (const char* robot : {"0", "1"}) {
     const Outcome mapped = run(std::string("map world/robot") + robot + " -o robot" + robot + kLean);
     ASSERT_EQ(mapped.code, 0) << mapped;
