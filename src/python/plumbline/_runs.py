@@ -166,6 +166,13 @@ def fuse(
     return Result(output)
 
 
+def _sigma_of(rest: Sequence[Any]) -> float:
+    """The standard deviation behind an observation, 5 mm if there is none."""
+    if len(rest) > 1:
+        raise ValueError(f"{len(rest)} values stand behind an observation; give its standard deviation alone")
+    return float(rest[0]) if rest else 0.005
+
+
 def adjust(
     map: Union[PathLike, Result],  # noqa: A002
     output: PathLike,
@@ -188,8 +195,8 @@ def adjust(
     """
     folder = os.fspath(map.folder) if isinstance(map, Result) else path_of(map, "map")
     wanted = _running(_core.FuseOptions(), "fuse", options, threads, force)
-    taped = [(p, q, metres, *rest) if rest else (p, q, metres, 0.005) for p, q, metres, *rest in lengths]
-    placed = [(p, world, *rest) if rest else (p, world, 0.005) for p, world, *rest in points]
+    taped = [(p, q, float(metres), _sigma_of(rest)) for p, q, metres, *rest in lengths]
+    placed = [(p, world, _sigma_of(rest)) for p, world, *rest in points]
     run = _core.start_adjust(folder, path_of(output, "output"), taped, placed, epsg, os.fspath(tags), os.fspath(edits), wanted)
     _finish(run, progress)
     return Result(output)
