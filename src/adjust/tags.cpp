@@ -111,8 +111,8 @@ void read_entry(const core::ConfigNode& node, TagControl& told, core::ConfigProb
   table.integer("tag", number, {0, 1000000}, "", "");
   table.numbers("tags", pair, 0, {0.0, 1e6}, "", "");
   table.numbers("at", world, 0, {-1e8, 1e8}, "m", "");
-  table.set_all(node, "", problems);
 
+  table.set_all(node, "", problems);
   control.sigma_m = sigma;
   const auto whole = [](double id) { return id == std::floor(id); };
   if (number >= 0 && world.size() == 3) {

@@ -29,6 +29,8 @@ void add_live_options(CLI::App& command, pipeline::MapRequest& request) {
           CLI::AsNumberWithUnit(std::map<std::string, double>{{"s", 1.0}, {"min", 60.0}, {"h", 3600.0}},
                                 CLI::AsNumberWithUnit::CASE_SENSITIVE, "TIME"))
       ->check(CLI::PositiveNumber);
+
+  // The frames, kept on disk and waiting in memory.
   command
       .add_option("--record", live.record,
                   "Live camera: also write the mapped frames to this MCAP file, which gives the same bytes "
@@ -61,6 +63,8 @@ void add_frames_options(CLI::App& command, PublishRequest& publish) {
           "With --publish: names of frames on /tf, as they are: map, odom, base (the robot's base, above the "
           "camera by /tf_static) and camera (the colour camera's optical frame)")
       ->type_name("base=base_link,...");
+
+  // Both have an effect only if the robot's base is named.
   command
       .add_option("--odom-tf", publish.odom_tf,
                   "With a base: odom -> base is published by us (own), by somebody else (other), or by us "
@@ -92,8 +96,7 @@ core::Result<void> prepare_publisher(Session& session, const PublishRequest& pub
   if (frames->given() && publish.robots > 1) {
     return core::usage_error(
         "--frames: names are those of one robot; map each recording in a run of its own, or leave it out: "
-        "frames "
-        "then begin with the robots' names");
+        "frames then begin with the robots' names");
   }
 
   // The publisher observes the run

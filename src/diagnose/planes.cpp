@@ -211,13 +211,11 @@ Sign ray_sign(const Planes& along_z, const Planes& along_ray) {
     return sign;
   sign.text = fmt::format(
       "depth is the distance along the ray, not along the camera's axis: {} planes bend ({:+.2f}; {:+.2f} if "
-      "it is "
-      "taken so)",
+      "it is taken so)",
       along_z.bends.size(), sign.size, along_ray.bend());
   sign.remedy =
       "divide each pixel's depth by sqrt(1 + x^2 + y^2), x = (u - cx) / fx, y = (v - cy) / fy, or let the "
-      "recorder "
-      "write z";
+      "recorder write z";
   return sign;
 }
 

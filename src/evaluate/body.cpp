@@ -5,13 +5,13 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <tuple>
 #include <utility>
 
 #include "plumbline/core/numbers.hpp"
+#include "plumbline/geometry/alignment.hpp"
 
 namespace plumbline::evaluate {
 namespace {
@@ -76,9 +76,7 @@ Matrix3d fit_turn(const std::vector<Motion>& motions) {
     for (std::size_t i = 0; i < motions.size(); ++i)
       sum += weights[i] * motions[i].body_turn * motions[i].camera_turn.transpose();
 
-    const Eigen::JacobiSVD<Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0;
-    turn = svd.matrixU() * Vector3d(1.0, 1.0, sign).asDiagonal() * svd.matrixV().transpose();
+    turn = geometry::nearest_rotation(sum);
 
     std::vector<double> residuals;
     residuals.reserve(motions.size());
@@ -254,9 +252,9 @@ std::optional<BodyReport> notable_body(const std::vector<MatchedPose>& poses, Tr
 std::string body_warning(const BodyReport& body) {
   return fmt::format(
       "the truth seems to hold the poses of a body, such as a marker or an IMU, in which the camera stays "
-      "{:.1f} cm "
-      "away and turned by {:.1f} degrees: with that taken out ATE is {:.4f} m instead of {:.4f} m, and the "
-      "orientation error {:.2f} degrees instead of {:.2f}; evaluate trajectory --body fit takes it out",
+      "{:.1f} cm away and turned by {:.1f} degrees: with that taken out ATE is {:.4f} m instead of {:.4f} m, "
+      "and the orientation error {:.2f} degrees instead of {:.2f}; evaluate trajectory --body fit takes it "
+      "out",
       100.0 * body.lever_m, body.turn_deg, body.ate_after_m, body.ate_before_m, body.orientation_after_deg,
       body.orientation_before_deg);
 }

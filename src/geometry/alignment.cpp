@@ -38,6 +38,12 @@ Rigid3 align_points(const std::vector<Eigen::Vector3d>& source, const std::vecto
   return {t.topLeftCorner<3, 3>(), t.topRightCorner<3, 1>()};
 }
 
+Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& m) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double handed = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0;
+  return svd.matrixU() * Eigen::Vector3d(1.0, 1.0, handed).asDiagonal() * svd.matrixV().transpose();
+}
+
 ScaledRigid3 align_points_scaled(const std::vector<Eigen::Vector3d>& source,
                                  const std::vector<Eigen::Vector3d>& target) {
   ScaledRigid3 result;

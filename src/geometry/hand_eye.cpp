@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "plumbline/geometry/alignment.hpp"
+
 namespace plumbline::geometry {
 namespace {
 
@@ -101,17 +103,14 @@ Rigid3 closed_form(const Equations& equations) {
   Eigen::Matrix3d axes = Eigen::Matrix3d::Zero();
   for (const Equation& e : equations) axes += e.motion->weight * e.reference_turn * e.camera_turn.transpose();
 
-  // A mirror would fit as well where the axes span a plane only.
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(axes, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d proper = Eigen::Matrix3d::Identity();
-  proper(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0;
-  const Eigen::Matrix3d base = svd.matrixU() * proper * svd.matrixV().transpose();
-
   // If all axes are alike, as on wheels, they leave the turn about them free: the shifts decide on it.
+  const Eigen::Matrix3d base = nearest_rotation(axes);
+  const Eigen::Vector3d axis =
+      Eigen::JacobiSVD<Eigen::Matrix3d>(axes, Eigen::ComputeFullU).matrixU().col(0).normalized();
   Rigid3 best;
   double least = std::numeric_limits<double>::infinity();
   for (int turn = 0; turn < kTurns; ++turn) {
-    const Eigen::AngleAxisd about(2.0 * M_PI * turn / kTurns, svd.matrixU().col(0).normalized());
+    const Eigen::AngleAxisd about(2.0 * M_PI * turn / kTurns, axis);
     const Eigen::Matrix3d rotation = about.toRotationMatrix() * base;
     const Rigid3 candidate(rotation, position_for(rotation, equations));
     const double cost = robust_cost(candidate, equations);

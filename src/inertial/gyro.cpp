@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
 #include "plumbline/core/numbers.hpp"
+#include "plumbline/geometry/alignment.hpp"
 #include "plumbline/inertial/body_motion.hpp"
 
 namespace plumbline::inertial {
@@ -44,13 +44,10 @@ GyroCalibration fit_axes(const std::vector<RatePair>& pairs) {
 
   // In turns, for each is estimated with the other one given.
   for (int i = 0; i < kTurns; ++i) {
-    // Rotation by Kabsch's method, without the bias.
+    // The rotation of the rates without the bias.
     Matrix3d sum = Matrix3d::Zero();
     for (const RatePair& p : pairs) sum += p.dt * p.camera * (p.sensor - found.bias).transpose();
-    const Eigen::JacobiSVD<Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    const double handed = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0;
-    found.camera_from_imu =
-        svd.matrixU() * Vector3d(1.0, 1.0, handed).asDiagonal() * svd.matrixV().transpose();
+    found.camera_from_imu = geometry::nearest_rotation(sum);
 
     // The bias is the mean of the differences left.
     Vector3d off = Vector3d::Zero();

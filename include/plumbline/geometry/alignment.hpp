@@ -14,6 +14,10 @@ namespace plumbline::geometry {
 /// line.
 Rigid3 align_points(const std::vector<Eigen::Vector3d>& source, const std::vector<Eigen::Vector3d>& target);
 
+/// The rotation R for which trace(R^T m) is largest, by singular value decomposition (Kabsch): with m the sum
+/// of a b^T, that which turns vectors b into a, and with m the sum of rotations, their mean.
+Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& m);
+
 /// A similarity: target = scale * rotation * source + translation.
 struct ScaledRigid3 {
   double scale = 1.0;

@@ -74,21 +74,25 @@ void add_adjust(CLI::App& app, Session& session) {
   command->add_option("-o,--output", state->fuse.output, "Folder for the result")
       ->required()
       ->type_name("OUT");
+
+  // Measurements between places of the map.
   command
       ->add_option("--length", state->lengths,
                    "The distance of two places as a tape or laser measured it; may be given several times")
       ->type_name("X,Y,Z X,Y,Z 4.57m");
-  command
-      ->add_option(
-          "--points", state->points,
-          "Table of control points: [name,] x, y, z in the map, E, N, H in the world [, sigma], metres")
-      ->type_name("FILE.csv");
   command->add_option("--level", state->levels, "Two places of one height; may be given several times")
       ->type_name("X,Y,Z X,Y,Z");
   command
       ->add_option("--plumb", state->plumbs,
                    "Two places, one straight above the other; may be given several times")
       ->type_name("X,Y,Z X,Y,Z");
+
+  // The map's place in the world.
+  command
+      ->add_option(
+          "--points", state->points,
+          "Table of control points: [name,] x, y, z in the map, E, N, H in the world [, sigma], metres")
+      ->type_name("FILE.csv");
   command
       ->add_option(
           "--epsg", state->request.epsg,
@@ -102,6 +106,8 @@ void add_adjust(CLI::App& app, Session& session) {
       ->delimiter(',')
       ->expected(3, 4)
       ->type_name("LAT,LON,HEADING[,HEIGHT]");
+
+  // Files beside the map.
   command
       ->add_option(
           "--edits", state->request.edits,

@@ -58,6 +58,8 @@ void add_fuse(CLI::App& app, Session& session) {
       ->required()
       ->expected(2, CLI::detail::expected_max_vector_size);
   command->add_option("-o,--output", request->output, "Folder for the result")->required()->type_name("OUT");
+
+  // The frame of the result, and joins that places alone do not make.
   command
       ->add_option("--anchor", request->anchor,
                    "Robot whose map defines the frame of the result (default: the one with the largest map)")

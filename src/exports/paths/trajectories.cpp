@@ -115,19 +115,17 @@ const std::vector<Content> kPathContents{Content::kTrajectory, Content::kKeyfram
 }  // namespace
 
 Format tum_format() {
-  return {
-      "tum",
-      {".txt", ".tum"},
-      kPathContents,
-      "",
-      "Path, TUM",
-      "`stamp tx ty tz qx qy qz qw`, seconds and metres; read by evo and `plumbline evaluate trajectory`. "
-      "Several robots are written to one file with a comment line before each, or to a folder with a file "
-      "each: "
-      "name a folder and the format, `--format tum -o FOLDER`. `--body` writes the path of a body that "
-      "carries the camera.",
-      {"body"},
-      &write_tum};
+  return {"tum",
+          {".txt", ".tum"},
+          kPathContents,
+          "",
+          "Path, TUM",
+          "`stamp tx ty tz qx qy qz qw`, seconds and metres; read by evo and `plumbline evaluate "
+          "trajectory`. Several robots are written to one file with a comment line before each, or to a "
+          "folder with a file each: name a folder and the format, `--format tum -o FOLDER`. `--body` writes "
+          "the path of a body that carries the camera.",
+          {"body"},
+          &write_tum};
 }
 
 Format kitti_format() {

@@ -239,9 +239,8 @@ Format colmap_format() {
       "see, with their tracks and the cloud's colours; `--dense-points 100000` takes points of the cloud "
       "instead, which have no tracks. Pictures are the keyframes'; `--every N` adds every N-th tracked "
       "frame, `--sharpest on` takes the sharpest picture near each keyframe, which suits splatting better "
-      "(only "
-      "keyframes have tracks). The recording is found by the map, or given with `--recording`, one for each "
-      "robot; if it is missing, the model has only poses, and the program says so.",
+      "(only keyframes have tracks). The recording is found by the map, or given with `--recording`, one for "
+      "each robot; if it is missing, the model has only poses, and the program says so.",
       {"text", "every", "sharpest", "dense_points", "voxel"},
       &write_colmap};
 }

@@ -143,8 +143,11 @@ void measure_doors(const cloud::Cloud& cloud, double floor_m, std::vector<WallDo
   for (WallDoor& door : doors) {
     const NearPoints points = points_near(cloud, floor_m, door);
     measure_jambs(points, door);
-    measure_head(points_near(cloud, floor_m, door), door);
-    measure_sill(points_near(cloud, floor_m, door), door);
+
+    // Between the jambs as they were measured.
+    const NearPoints within = points_near(cloud, floor_m, door);
+    measure_head(within, door);
+    measure_sill(within, door);
     if (door.width_m > kWidestLeaf_m || door.head_m > 2.3) door.kind = OpeningKind::kPassage;
     if (door.sill_m > 0.0) door.kind = OpeningKind::kWindow;
   }

@@ -130,17 +130,12 @@ Format plan_format() {
           "",
           "Floor plan or section for architects",
           "A sheet with the walls at `--cut` over the floor, hatched where both faces were seen, else as "
-          "thick as is "
-          "assumed; openings with clear widths, furniture, dimensions, rooms with areas, tables, title "
-          "block, scale bar and "
-          "coordinates ([plans.md](plans.md)). SVG, PDF and DXF (R2000, metres, layers A-WALL, A-DOOR, "
-          "A-GLAZ, A-AREA, "
-          "A-FURN, A-ANNO) show the same; a storey is a page of the PDF, or a file. `plan.json` holds rooms, "
-          "openings and walls as "
-          "numbers. `--section x,y,x,y` draws a vertical cut along that line instead. Doors are where "
-          "cameras looked through "
-          "a wall (without `map.db`: what lies below a lintel); closed doors are wall "
-          "([plans.md](../method/plans.md)).",
+          "thick as is assumed; openings with clear widths, furniture, dimensions, rooms with areas, tables, "
+          "title block, scale bar and coordinates ([plans.md](plans.md)). SVG, PDF and DXF (R2000, metres, "
+          "layers A-WALL, A-DOOR, A-GLAZ, A-AREA, A-FURN, A-ANNO) show the same; a storey is a page of the "
+          "PDF, or a file. `plan.json` holds rooms, openings and walls as numbers. `--section x,y,x,y` draws "
+          "a vertical cut along that line instead. Doors are where cameras looked through a wall (without "
+          "`map.db`: what lies below a lintel); closed doors are wall ([plans.md](../method/plans.md)).",
           {"cut", "section", "paper", "scale", "title", "client", "address", "date", "title_block", "decimal",
            "without", "voxel", "datum", "epsg", "origin"},
           &write_plan};

@@ -74,8 +74,7 @@ std::string objection(const MergeEvidence& merge) {
   if (merge.ambiguity.against_like + merge.validation.against_like >= 0.0) return {};
   return fmt::format(
       "a place that looks alike in part: of {} keyframes that should see what the other map holds, {} do, "
-      "and "
-      "{} of {} landmarks are found",
+      "and {} of {} landmarks are found",
       merge.validation.expected, merge.validation.confirmed, merge.ambiguity.overlap.matched,
       merge.ambiguity.overlap.expected);
 }

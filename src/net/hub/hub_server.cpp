@@ -251,8 +251,7 @@ void HubServer::apply_failure(RobotSession& session, const core::Error& error) {
     reply.answer = Answer::kRefused;
     reply.problem = fmt::format(
         "{} sent data that Plumbline {} cannot store ({}): check both ends for the same version, then start "
-        "it "
-        "again with --resume",
+        "it again with --resume",
         name, core::version(), error.message);
   }
   log_.error(reply.problem);

@@ -335,11 +335,11 @@ core::Result<Rigid3> mounted(const PublishedFrames& frames, const TransformListe
   const auto begin = std::chrono::steady_clock::now();
   const auto mount = others.wait_for(frames.base, frames.camera, kStatic);
   if (!mount) {
-    return core::usage_error(fmt::format(
-        "--frames: no transform leads from {} to {} on /tf_static within {} s; start robot_state_publisher "
-        "or a "
-        "static_transform_publisher first, or name other frames (camera=: the colour camera's optical frame)",
-        frames.base, frames.camera, kStatic.count()));
+    return core::usage_error(
+        fmt::format("--frames: no transform leads from {} to {} on /tf_static within {} s; start "
+                    "robot_state_publisher or a static_transform_publisher first, or name other frames "
+                    "(camera=: the colour camera's optical frame)",
+                    frames.base, frames.camera, kStatic.count()));
   }
 
   while (frames.odom_tf == OdomTf::kAuto && others.other_parent().empty() &&

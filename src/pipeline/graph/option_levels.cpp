@@ -50,9 +50,8 @@ const Keys kInternal{
          "triangulate.max_sigma triangulate.line_views bundle.rounds surface.max_incidence vocabulary.split "
          "places.min_score places.min_absolute places.votes places.consistent verify.min_found "
          "verify.min_evidence verify.min_cells keyframe.cone_balance keyframe.cone_scaled keyframe.urgent "
-         "thumbnails "
-         "motion_prior pnp_start landmark.by_keyframes bundle.depth_rows "
-         "solver.depth_rows verify.depth_rows verify.align verify.joint match.min_line_ratio")},
+         "thumbnails motion_prior pnp_start landmark.by_keyframes bundle.depth_rows solver.depth_rows "
+         "verify.depth_rows verify.align verify.joint match.min_line_ratio")},
     {"localize",
      keys_in("depth align_stamps thumbnails motion_prior pnp_start readout min_inliers min_surface "
              "match.max_hamming match.ratio match.align match.aligned_sigma match.max_line_hamming "

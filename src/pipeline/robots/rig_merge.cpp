@@ -6,11 +6,10 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <set>
 
-#include "plumbline/core/json.hpp"
 #include "plumbline/geometry/adjoint.hpp"
+#include "plumbline/geometry/alignment.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -140,12 +139,11 @@ void warn_of_contradiction(const Rig& rig, const RigCamera& camera,
       std::sqrt(free.covariance.bottomRightCorner<3, 3>().trace() + camera.sigma_rad.squaredNorm());
   if (apart < 4.0 * sigma_m && turned < 4.0 * sigma_rad) return;
 
-  log.warning(fmt::format(
-      "{}: cameras.{}: the motion shows a pose that is {:.0f} mm and {:.1f} degrees off the given one, which "
-      "must lead from the camera's optical frame to that of {} (x right, y down, z ahead); leave it out to "
-      "have "
-      "it found",
-      rig.file.string(), camera.name, 1e3 * apart, turned / kDegree, rig.cameras.front().name));
+  log.warning(
+      fmt::format("{}: cameras.{}: the motion shows a pose that is {:.0f} mm and {:.1f} degrees off the "
+                  "given one, which must lead from the camera's optical frame to that of {} (x right, y "
+                  "down, z ahead); leave it out to have it found",
+                  rig.file.string(), camera.name, 1e3 * apart, turned / kDegree, rig.cameras.front().name));
 }
 
 /// The pose as given, or from the motions.
@@ -247,13 +245,8 @@ mapping::Alignment mean_alignment(const std::vector<mapping::VerifiedPair>& pair
     mean_b += b.translation / static_cast<double>(pairs.size());
   }
 
-  // The rotation nearest to the sum.
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(turns, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d proper = Eigen::Matrix3d::Identity();
-  proper(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0;
-  const Eigen::Matrix3d rotation = svd.matrixU() * proper * svd.matrixV().transpose();
-
   mapping::Alignment alignment;
+  const Eigen::Matrix3d rotation = geometry::nearest_rotation(turns);
   alignment.a_from_b = {rotation, mean_a - rotation * mean_b};
   double squares = 0.0;
   for (std::size_t i = 0; i < at_a.size(); ++i)
@@ -292,8 +285,7 @@ void tell(const std::string& reference, const RigPlace& place, core::Log& log) {
   const Matrix6d& covariance = place.pose.covariance;
   log.info(fmt::format(
       "rig: {} is {:.1f} mm from {} and turned by {:.2f} degrees, {} to {:.1f} mm and {:.2f} degrees{}; {} "
-      "pairs "
-      "of keyframes",
+      "pairs of keyframes",
       place.name, 1e3 * pose.translation.norm(), reference, geometry::rotation_angle(pose.rotation) / kDegree,
       place.found ? fmt::format("found from {} motions", place.pose.motions) : std::string("given"),
       1e3 * std::sqrt(covariance.topLeftCorner<3, 3>().trace()),
@@ -302,8 +294,6 @@ void tell(const std::string& reference, const RigPlace& place, core::Log& log) {
                                  : fmt::format("; its clock is {:.1f} ms late", 1e3 * place.time_offset_s),
       place.pairs));
 }
-
-Json list_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 }  // namespace
 
@@ -356,52 +346,6 @@ core::Result<RigMerge> rig_merge(const Rig& rig, const std::vector<RobotMap>& pa
     result.cameras.push_back(std::move(place));
   }
   return result;
-}
-
-Json section_of(const RigMerge& rig) {
-  Json cameras = Json::array();
-  for (const RigPlace& place : rig.cameras) {
-    const Eigen::Quaterniond q = place.pose.reference_from_camera.quaternion();
-    const Eigen::Matrix<double, 6, 1> sigma = place.pose.covariance.diagonal().cwiseSqrt();
-    Json camera = {{"name", place.name},
-                   {"position", list_of(place.pose.reference_from_camera.translation)},
-                   {"rotation", {q.x(), q.y(), q.z(), q.w()}},
-                   {"sigma_position_m", list_of(sigma.head<3>())},
-                   {"sigma_rotation_rad", list_of(sigma.tail<3>())},
-                   {"pose", place.found ? "found" : "given"}};
-
-    // The evidence, not rounded: residuals of good cameras are below a tenth of a millimetre.
-    camera["motions"] = place.pose.motions;
-    camera["independent_motions"] = rounded(place.pose.independent);
-    camera["residual_m"] = place.pose.residual_m;
-    camera["residual_rad"] = place.pose.residual_rad;
-    camera["time_offset_s"] = place.time_offset_s;
-    camera["time_offset"] = place.offset_is;
-    camera["pairs"] = place.pairs;
-    cameras.push_back(std::move(camera));
-  }
-  return {{"reference", rig.reference}, {"cameras", cameras}};
-}
-
-std::string to_yaml(const RigMerge& rig) {
-  std::string text =
-      "# Cameras of one robot: position (m) and rotation (qx, qy, qz, qw) lead from a camera's optical "
-      "frame\n"
-      "# to that of the first one. plumbline map RECORDING RECORDING --rig rig.yaml -o OUT\n";
-  text += fmt::format("cameras:\n  {}: {{}}\n", core::json_text(Json(rig.reference), -1));
-  for (const RigPlace& place : rig.cameras) {
-    const Eigen::Vector3d& t = place.pose.reference_from_camera.translation;
-    const Eigen::Quaterniond q = place.pose.reference_from_camera.quaternion();
-    const Eigen::Matrix<double, 6, 1> s = place.pose.covariance.diagonal().cwiseSqrt();
-
-    text += fmt::format("  {}:\n", core::json_text(Json(place.name), -1));
-    text += fmt::format("    position: [{:.6f}, {:.6f}, {:.6f}]\n", t.x(), t.y(), t.z());
-    text += fmt::format("    rotation: [{:.9f}, {:.9f}, {:.9f}, {:.9f}]\n", q.x(), q.y(), q.z(), q.w());
-    text += fmt::format("    sigma: {{position: [{:.6f}, {:.6f}, {:.6f}], ", s[0], s[1], s[2]);
-    text += fmt::format("rotation: [{:.7f}, {:.7f}, {:.7f}]}}\n", s[3], s[4], s[5]);
-    text += fmt::format("    time_offset: {:.6f} s\n", place.time_offset_s);
-  }
-  return text;
 }
 
 }  // namespace plumbline::pipeline

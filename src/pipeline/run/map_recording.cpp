@@ -436,8 +436,7 @@ core::Result<RunSummary> map_recording(const MapRequest& given, const core::Exec
   if (!request->into.empty() && !request->rig.empty()) {
     return core::usage_error(
         "--rig: joins recordings of one robot's cameras; map them first, then fuse the result with the map "
-        "of "
-        "--into");
+        "of --into");
   }
   if (!request->into.empty() && request->part == PipelinePart::kWhole)
     return map_into(*request, executor, log, stop, progress);

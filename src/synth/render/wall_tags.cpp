@@ -190,8 +190,7 @@ core::Result<void> hang_tags(const SynthOptions& options, Scene& scene) {
   if (chosen.size() < wanted) {
     return core::usage_error(
         fmt::format("tags: the cameras come near free wall for {} tags, not for {}; ask for fewer, for more "
-                    "frames or for "
-                    "larger pictures",
+                    "frames or for larger pictures",
                     chosen.size(), wanted));
   }
 
