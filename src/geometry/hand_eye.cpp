@@ -334,8 +334,10 @@ ClockOffset find_clock_offset(const Trajectory& reference, const Trajectory& cam
   const int each_side = static_cast<int>(std::lround(kSearched_s / kCoarse_s));
   for (int i = -each_side; i <= each_side; ++i) look(kCoarse_s * i);
 
-  for (double step = kCoarse_s / 2.0; step > 5e-5; step /= 2.0) {
+  // Eight halvings: from 10 ms to less than 0.1 ms.
+  for (int halving = 1; halving <= 8; ++halving) {
     const double middle = best;
+    const double step = std::ldexp(kCoarse_s, -halving);
     look(middle - step);
     look(middle + step);
   }

@@ -28,7 +28,9 @@ std::optional<double> main_place(const std::vector<double>& places) {
   double best = first;
   std::ptrdiff_t most = -1;
 
-  for (double at = first; at <= last; at += kBin_m) {
+  const int bins = static_cast<int>((last - first) / kBin_m) + 1;
+  for (int bin = 0; bin < bins; ++bin) {
+    const double at = first + kBin_m * bin;
     const auto near =
         std::count_if(places.begin(), places.end(), [&](double s) { return std::abs(s - at) < kNear_m; });
     if (near <= most) continue;
@@ -236,6 +238,7 @@ std::vector<std::vector<Eigen::Vector2d>> furniture_outlines(const cloud::Cloud&
     std::vector<cv::Point> corners;
     cv::approxPolyDP(contour, corners, 1.5, true);
     std::vector<Eigen::Vector2d> outline;
+    outline.reserve(corners.size());
 
     for (const cv::Point& p : corners)
       outline.emplace_back(low + kCell_m * Eigen::Vector2d(p.x + 0.5, p.y + 0.5));

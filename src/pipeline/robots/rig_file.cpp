@@ -120,6 +120,7 @@ core::Result<std::optional<Rig>> rig_of_run(const std::filesystem::path& file,
   }
 
   std::vector<std::string> names;
+  names.reserve(robots.size());
   for (const maps::RobotInfo& robot : robots) names.push_back(robot.name);
   for (const RigCamera& camera : rig->cameras) {
     if (std::find(names.begin(), names.end(), camera.name) != names.end()) continue;
