@@ -27,11 +27,16 @@ std::vector<maps::FramePose> only_keyframes(const std::vector<maps::FramePose>& 
   return some;
 }
 
-/// Motions of the keyframes, each in its camera's axes, if the camera is another one.
-std::vector<Vector6d> motions_for(const maps::Map& map, std::vector<maps::FramePose> frames,
-                                  const sensor::Recalibration& change) {
+/// The map as another camera would have made it.
+maps::Map map_of(const maps::Map& map, std::vector<maps::FramePose> frames,
+                 const sensor::Recalibration& change) {
   maps::Map other = map;
   recalibrate_map(change, other, frames);
+  return other;
+}
+
+/// Motions of the keyframes from one map to another, each in its camera's axes.
+std::vector<Vector6d> motions_between(const maps::Map& map, const maps::Map& other) {
   std::vector<Vector6d> motions;
   for (const core::KeyframeId id : map.keyframe_ids()) {
     const geometry::Rigid3 step = map.camera_from_world(id) * other.camera_from_world(id).inverse();
@@ -59,13 +64,16 @@ std::vector<KeyframeShift> camera_shifts(const maps::Map& map, const std::vector
   const std::vector<maps::FramePose> keyframes = only_keyframes(frames, map);
   const optimize::CameraChange sigma = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
 
+  // The pose graph moves keyframes even if the camera stays: that is no effect of the camera.
+  const maps::Map same = map_of(map, keyframes, sensor::Recalibration(image, camera, camera));
+
   // One standard deviation of each number.
   std::vector<std::vector<Vector6d>> by_number(kCameraUnknowns);
   executor.parallel_for(kCameraUnknowns, [&](std::size_t u) {
     optimize::CameraChange change = optimize::change_between(camera, camera);
     change[static_cast<Eigen::Index>(u)] += sigma[static_cast<Eigen::Index>(u)];
     const sensor::Recalibration to(image, camera, optimize::changed_camera(camera, change));
-    by_number[u] = motions_for(map, keyframes, to);
+    by_number[u] = motions_between(same, map_of(map, keyframes, to));
   });
 
   // Their combinations that are independent.
