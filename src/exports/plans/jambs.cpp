@@ -239,7 +239,6 @@ std::vector<std::vector<Eigen::Vector2d>> furniture_outlines(const cloud::Cloud&
     cv::approxPolyDP(contour, corners, 1.5, true);
     std::vector<Eigen::Vector2d> outline;
     outline.reserve(corners.size());
-
     for (const cv::Point& p : corners)
       outline.emplace_back(low + kCell_m * Eigen::Vector2d(p.x + 0.5, p.y + 0.5));
     outlines.push_back(std::move(outline));
