@@ -107,6 +107,7 @@ Rigid3 closed_form(const Equations& equations) {
   const Eigen::Matrix3d base = nearest_rotation(axes);
   const Eigen::Vector3d axis =
       Eigen::JacobiSVD<Eigen::Matrix3d>(axes, Eigen::ComputeFullU).matrixU().col(0).normalized();
+
   Rigid3 best;
   double least = std::numeric_limits<double>::infinity();
   for (int turn = 0; turn < kTurns; ++turn) {

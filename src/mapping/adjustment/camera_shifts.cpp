@@ -64,7 +64,7 @@ std::vector<KeyframeShift> camera_shifts(const maps::Map& map, const std::vector
   const std::vector<maps::FramePose> keyframes = only_keyframes(frames, map);
   const optimize::CameraChange sigma = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
 
-  // The pose graph moves keyframes even if the camera stays: that is no effect of the camera.
+  // Rows are corrected anew by the final velocities, even if the camera stays: that is no effect of the camera.
   const maps::Map same = map_of(map, keyframes, sensor::Recalibration(image, camera, camera));
 
   // One standard deviation of each number.
@@ -81,14 +81,17 @@ std::vector<KeyframeShift> camera_shifts(const maps::Map& map, const std::vector
   std::vector<KeyframeShift> shifts;
   for (const core::KeyframeId id : map.keyframe_ids()) {
     KeyframeShift shift{id, map.keyframe(id).stamp, {}};
+
     for (Eigen::Index m = 0; m < root.cols(); ++m) {
       Vector6d motion = Vector6d::Zero();
       for (std::size_t u = 0; u < kCameraUnknowns; ++u)
         motion += root(static_cast<Eigen::Index>(u), m) * by_number[u][shifts.size()];
       shift.motions.push_back(motion);
     }
+
     shifts.push_back(std::move(shift));
   }
+
   return shifts;
 }
 

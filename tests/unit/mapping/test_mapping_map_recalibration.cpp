@@ -161,6 +161,26 @@ TEST(MapRecalibration, ShiftsByTheCovarianceAreThoseOfTheOtherCamera) {
   EXPECT_GT(largest, 0.002);
 }
 
+// Rows are corrected anew by the final path's velocities, which moves keyframes, but that is no effect of the
+// camera.
+TEST(MapRecalibration, WhatNewVelocitiesMoveIsNoShift) {
+  FilmedWall wall;
+  auto keyframe = std::make_shared<maps::Keyframe>(wall.world.map.keyframe(wall.keyframes[2]));
+  auto features = std::make_shared<features::FrameFeatures>(*keyframe->features);
+  features->shutter_motion << 0.02, 0.0, 0.01, 0.0, 0.02, 0.0;
+  keyframe->features = std::move(features);
+  wall.world.map.replace_keyframe(keyframe);
+  FilmedWall moved = wall;
+  moved.change(moved.given(), moved.given());
+  EXPECT_GT(largest_difference(moved.poses(), wall.poses()), 1e-3);
+
+  const optimize::CameraCovariance covariance = 1e-16 * optimize::CameraCovariance::Identity();
+  for (const KeyframeShift& shift : camera_shifts(wall.world.map, wall.frames, wall.world.camera,
+                                                  wall.given(), covariance, core::Executor(2))) {
+    for (const geometry::Vector6d& motion : shift.motions) EXPECT_LT(motion.norm(), 1e-5);
+  }
+}
+
 /// Ten frames between the first two keyframes of a wall, whose corrected poses drift away from their
 /// keyframe.
 struct FramesBetween {
