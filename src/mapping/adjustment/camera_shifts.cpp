@@ -64,7 +64,7 @@ std::vector<KeyframeShift> camera_shifts(const maps::Map& map, const std::vector
   const std::vector<maps::FramePose> keyframes = only_keyframes(frames, map);
   const optimize::CameraChange sigma = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
 
-  // Rows are corrected anew by the final velocities, even if the camera stays: that is no effect of the camera.
+  // Even if the camera stays, rows are corrected anew by the final velocities: no effect of the camera.
   const maps::Map same = map_of(map, keyframes, sensor::Recalibration(image, camera, camera));
 
   // One standard deviation of each number.
