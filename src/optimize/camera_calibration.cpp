@@ -186,6 +186,11 @@ class CameraUnknowns {
       std::copy_n(problem.points[i].data(), 3, point(static_cast<int>(i)));
   }
   double* change() { return numbers_.data(); }
+
+  /// Of all poses and points: turn and shift of each pose, then the coordinates of each point.
+  Eigen::Map<Eigen::VectorXd> others() {
+    return {numbers_.data() + kCameraUnknowns, static_cast<Eigen::Index>(numbers_.size() - kCameraUnknowns)};
+  }
   double* step(int i) { return numbers_.data() + kCameraUnknowns + kSteps * static_cast<std::size_t>(i); }
   double* point(int i) {
     return numbers_.data() + kCameraUnknowns + kSteps * poses_ + 3 * static_cast<std::size_t>(i);
@@ -212,6 +217,21 @@ void add_observations(const CalibrationProblem& problem, CameraUnknowns& unknown
     if (!(o.depth > 0.0)) continue;
     to.AddResidualBlock(new DepthCost(o, pose, share), depth_loss, unknowns.change(), step, point);
   }
+}
+
+/// Moves poses and points to where they are expected for the present camera, from how they followed it when it
+/// was adjusted last, unless the cost is higher there: a point that is seen along one ray only follows wildly.
+void follow_camera(const CalibrationProblem& problem, CameraUnknowns& unknowns,
+                   ceres::Problem& ceres_problem) {
+  if (problem.following.rows() == 0) return;
+  double cost = 0.0, expected = 0.0;
+  const bool possible = ceres_problem.Evaluate({}, &cost, nullptr, nullptr, nullptr);
+
+  const Eigen::VectorXd start = unknowns.others();
+  const Eigen::Map<const CameraChange> change(unknowns.change());
+  unknowns.others() += problem.following * (change - problem.optimum);
+  const bool follows = ceres_problem.Evaluate({}, &expected, nullptr, nullptr, nullptr);
+  if (possible && !(follows && expected < cost)) unknowns.others() = start;
 }
 
 /// Adjusts poses and points for the present camera.
@@ -252,8 +272,13 @@ ceres::Problem::EvaluateOptions columns_of(const CalibrationProblem& problem, Ca
   return order;
 }
 
-/// The part of each row's derivative by the camera that remains when poses and points follow it.
-std::optional<Eigen::MatrixXd> derivative_by_camera_alone(const ceres::CRSMatrix& crs) {
+/// Derivatives by the camera when poses and points follow it.
+struct ByCamera {
+  Eigen::MatrixXd rows;    ///< of each row of the Jacobian
+  Eigen::MatrixXd others;  ///< of poses and points, in the order of the Jacobian's columns
+};
+
+std::optional<ByCamera> derivative_by_camera(const ceres::CRSMatrix& crs) {
   const Eigen::SparseMatrix<double> jacobian = Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(
       crs.num_rows, crs.num_cols, static_cast<int>(crs.values.size()), crs.rows.data(), crs.cols.data(),
       crs.values.data());
@@ -267,10 +292,11 @@ std::optional<Eigen::MatrixXd> derivative_by_camera_alone(const ceres::CRSMatrix
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);
   if (factor.info() != Eigen::Success) return std::nullopt;
 
-  const Eigen::MatrixXd answered = factor.solve(Eigen::MatrixXd(by_others.transpose() * by_camera));
-  Eigen::MatrixXd alone = by_camera - by_others * answered;
-  if (!alone.allFinite()) return std::nullopt;
-  return alone;
+  ByCamera result;
+  result.others = -factor.solve(Eigen::MatrixXd(by_others.transpose() * by_camera));
+  result.rows = by_camera + by_others * result.others;
+  if (!result.rows.allFinite()) return std::nullopt;
+  return result;
 }
 
 /// Gradient and information of each block of time, and of all.
@@ -296,20 +322,34 @@ void add_blocks(const CalibrationProblem& problem, const Eigen::MatrixXd& deriva
   }
 }
 
+/// How poses and points follow the camera, which the problem keeps for its next camera.
+void keep_following(const ceres::Problem::EvaluateOptions& columns, const Eigen::MatrixXd& others,
+                    ceres::Problem& ceres_problem, CameraUnknowns& unknowns, CalibrationProblem& problem) {
+  problem.optimum = Eigen::Map<const CameraChange>(unknowns.change());
+  problem.following.setZero(unknowns.others().size(), kCameraUnknowns);
+  Eigen::Index row = 0;
+  for (double* block : columns.parameter_blocks) {
+    if (block == unknowns.change()) continue;
+    const Eigen::Index size = ceres_problem.ParameterBlockSize(block);
+    problem.following.middleRows(block - unknowns.others().data(), size) = others.middleRows(row, size);
+    row += size;
+  }
+}
+
 /// The quadratic cost around the present unknowns, with poses and points eliminated.
-std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, CameraUnknowns& unknowns,
+std::optional<CameraEvidence> eliminated(CalibrationProblem& problem, CameraUnknowns& unknowns,
                                          ceres::Problem& ceres_problem) {
   CameraEvidence evidence;
   evidence.at = Eigen::Map<const CameraChange>(unknowns.change());
+  const ceres::Problem::EvaluateOptions columns = columns_of(problem, unknowns, ceres_problem);
   std::vector<double> residuals;
   ceres::CRSMatrix crs;
-  if (!ceres_problem.Evaluate(columns_of(problem, unknowns, ceres_problem), &evidence.cost, &residuals,
-                              nullptr, &crs))
-    return std::nullopt;
+  if (!ceres_problem.Evaluate(columns, &evidence.cost, &residuals, nullptr, &crs)) return std::nullopt;
 
-  const auto alone = derivative_by_camera_alone(crs);
-  if (!alone) return std::nullopt;
-  add_blocks(problem, *alone, residuals, evidence);
+  const auto derivative = derivative_by_camera(crs);
+  if (!derivative) return std::nullopt;
+  add_blocks(problem, derivative->rows, residuals, evidence);
+  keep_following(columns, derivative->others, ceres_problem, unknowns, problem);
   return evidence;
 }
 
@@ -362,6 +402,7 @@ std::optional<CameraEvidence> camera_evidence(CalibrationProblem& problem, const
   ceres::CauchyLoss depth_loss(1.5);  // corners at the rim of things have the depth of the background
   ceres::Problem ceres_problem(options);
   add_observations(problem, unknowns, &pixel_loss, &depth_loss, ceres_problem);
+  follow_camera(problem, unknowns, ceres_problem);
   if (!adjust(problem, unknowns, ceres_problem)) return std::nullopt;
 
   // Poses and points are eliminated

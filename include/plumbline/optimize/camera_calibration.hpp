@@ -68,6 +68,11 @@ struct CalibrationProblem {
   std::vector<CalibrationPose> poses;
   std::vector<Eigen::Vector3d> points;  ///< world, metres
   std::vector<CalibrationObservation> observations;
+  /// Set by camera_evidence(): the camera's change at which poses and points are at their optimum, and how
+  /// they follow it, to first order. A row for each turn and shift of a pose, in their order, then for each
+  /// coordinate of a point; no rows: not known yet.
+  CameraChange optimum = CameraChange::Zero();
+  Eigen::Matrix<double, Eigen::Dynamic, kCameraUnknowns> following{};
 };
 
 /// A quadratic function of the change: gradient and second derivative at CameraEvidence::at.

@@ -11,17 +11,19 @@
 namespace plumbline::pipeline {
 namespace {
 
-// Size of the map when its camera is estimated: keyframes, or seconds of the recording.
+// Size of the map when its camera is estimated: keyframes, or seconds of the recording; fewer seconds do if
+// they have as many frames as an estimate uses at most.
 constexpr std::size_t kKeyframes = 40;
 constexpr double kSeconds = 10.0;
+constexpr double kLeastSeconds = 6.5;
+constexpr std::size_t kFrames = 200;
 // Frames from the start of an estimate until its answer is awaited, and from then until it is used: by then
-// no frame for which it is used has been read, for any number of threads. No estimate is started if too few
-// frames would be left. A live source has no known end: the answer is used once that many more frames have
-// arrived.
+// no frame for which it is used has been read, for any number of threads. No estimate is started if it would
+// not be used. A live source has no known end: the answer is used once that many more frames have arrived.
 constexpr std::size_t kAnswerFrames = 32;
-constexpr std::size_t kLeastFramesLeft = 60;
-constexpr std::size_t kUseFrames = kMostUnderWay + kLeastFramesLeft;
-// Most estimates from a finished map: effects of a wrong camera on it show only after it is rebuilt.
+constexpr std::size_t kUseFrames = kMostUnderWay;
+// Most estimates from a finished map. Effects of a wrong camera on a map that was made with it show only after
+// it is rebuilt; one that a better camera has made is asked once.
 constexpr int kMostQuestions = 2;
 
 }  // namespace
@@ -49,7 +51,8 @@ std::vector<sensor::Camera> RobotCameras::now() const {
 }
 
 bool RobotCameras::knows_enough(std::size_t frame, const Slams& slams) const {
-  return recordings_->time_of(frame) - recordings_->time_of(0) >= kSeconds ||
+  const double seconds = recordings_->time_of(frame) - recordings_->time_of(0);
+  return seconds >= kSeconds || (seconds >= kLeastSeconds && frame >= kFrames) ||
          std::all_of(slams.begin(), slams.end(),
                      [](const auto& slam) { return slam->map().keyframe_count() >= kKeyframes; });
 }
@@ -184,7 +187,7 @@ void RobotCameras::estimate_finished(Slams& slams) {
     std::unique_ptr<mapping::Slam>& slam = slams[r];
     if (!waiting_.empty() && waiting_[r])
       use(r, true, slam);  // its last frame came before the answer was used
-    for (int i = 0; i < kMostQuestions; ++i) {
+    for (int i = robots_[r].versions.empty() ? 0 : 1; i < kMostQuestions; ++i) {
       if (!cameras_[r].ask(slam->map(), slam->frame_poses(), *executor_, *log_)) break;
       use(r, !answered_ && i == 0, slam);
     }

@@ -20,7 +20,7 @@ struct Moment {
 };
 constexpr Moment kMoments[] = {{Known::kNothing, 8},    {Known::kNothing, 20}, {Known::kNothing, 35},
                                {Known::kAsked, 0},      {Known::kAsked, 72},   {Known::kAnswered, 0},
-                               {Known::kAnswered, 150}, {Known::kUsed, 0},     {Known::kUsed, 228}};
+                               {Known::kAnswered, 120}, {Known::kUsed, 0},     {Known::kUsed, 228}};
 
 class CameraResume : public ProgramTest {
  protected:
