@@ -187,7 +187,7 @@ class CameraUnknowns {
   }
   double* change() { return numbers_.data(); }
 
-  /// Of all poses and points: turn and shift of each pose, then the coordinates of each point.
+  /// All poses and points: turn and shift of each pose, then the coordinates of each point.
   Eigen::Map<Eigen::VectorXd> others() {
     return {numbers_.data() + kCameraUnknowns, static_cast<Eigen::Index>(numbers_.size() - kCameraUnknowns)};
   }
@@ -219,8 +219,9 @@ void add_observations(const CalibrationProblem& problem, CameraUnknowns& unknown
   }
 }
 
-/// Moves poses and points to where they are expected for the present camera, from how they followed it when it
-/// was adjusted last, unless the cost is higher there: a point that is seen along one ray only follows wildly.
+/// Moves poses and points to where they are expected for the present camera, from how they followed it when
+/// it was adjusted last, unless the cost is higher there: a point that is seen along one ray only follows
+/// wildly.
 void follow_camera(const CalibrationProblem& problem, CameraUnknowns& unknowns,
                    ceres::Problem& ceres_problem) {
   if (problem.following.rows() == 0) return;
@@ -274,8 +275,8 @@ ceres::Problem::EvaluateOptions columns_of(const CalibrationProblem& problem, Ca
 
 /// Derivatives by the camera when poses and points follow it.
 struct ByCamera {
-  Eigen::MatrixXd rows;    ///< of each row of the Jacobian
-  Eigen::MatrixXd others;  ///< of poses and points, in the order of the Jacobian's columns
+  Eigen::MatrixXd rows;    ///< rows of the Jacobian
+  Eigen::MatrixXd others;  ///< poses and points, in the order of the Jacobian's columns
 };
 
 std::optional<ByCamera> derivative_by_camera(const ceres::CRSMatrix& crs) {
@@ -322,7 +323,7 @@ void add_blocks(const CalibrationProblem& problem, const Eigen::MatrixXd& deriva
   }
 }
 
-/// How poses and points follow the camera, which the problem keeps for its next camera.
+/// The problem keeps for its next camera how poses and points follow.
 void keep_following(const ceres::Problem::EvaluateOptions& columns, const Eigen::MatrixXd& others,
                     ceres::Problem& ceres_problem, CameraUnknowns& unknowns, CalibrationProblem& problem) {
   problem.optimum = Eigen::Map<const CameraChange>(unknowns.change());

@@ -22,8 +22,8 @@ constexpr std::size_t kFrames = 200;
 // not be used. A live source has no known end: the answer is used once that many more frames have arrived.
 constexpr std::size_t kAnswerFrames = 32;
 constexpr std::size_t kUseFrames = kMostUnderWay;
-// Most estimates from a finished map. Effects of a wrong camera on a map that was made with it show only after
-// it is rebuilt; one that a better camera has made is asked once.
+// Most estimates from a finished map. Effects of a wrong camera on a map that was made with it show only
+// after it is rebuilt; one that a better camera has made is asked once.
 constexpr int kMostQuestions = 2;
 
 }  // namespace

@@ -45,9 +45,10 @@ class TrackStage : public Stage {
     table.boolean("gyro", gyro_, "Use the gyroscope of a recording that has one, once its axes are known");
     table.boolean("wheels", wheels_,
                   "Use wheel odometry of a recording that has it, once its scale is known");
-    table.choice<bool>("camera.refine", refine_, {{"auto", true}, {"off", false}},
-                       "Estimate the camera from the map, after 40 keyframes, 200 frames or 10 s and at the end, and "
-                       "rebuild the map for it");
+    table.choice<bool>(
+        "camera.refine", refine_, {{"auto", true}, {"off", false}},
+        "Estimate the camera from the map, after 40 keyframes, 200 frames or 10 s and at the end, and "
+        "rebuild the map for it");
     table.integer("camera.pictures", pictures_, {1, 1'000'000}, "",
                   "Keyframes of each robot, from the first on, whose pictures are read again for a better "
                   "camera; a live run keeps no more of them");
