@@ -220,7 +220,7 @@ class Check {
       }
 
       report.align[gap] = {pairs_[gap].size(), core::quantile(shifts, 0.5, 0.0),
-                           core::quantile(shifts, 0.9, 0.0), core::quantile(unexplained, 0.5, 0.0)};
+                           core::quantile(shifts, 0.9, 0.0), core::least_median(unexplained, 0.0)};
       report.pairs += pairs_[gap].size();
     }
 

@@ -61,7 +61,8 @@ struct GapReport {
   std::size_t pairs = 0;
   double median_m = 0.0;  ///< length of the shift, less its own noise
   double p90_m = 0.0;
-  double unexplained_m = 0.0;  ///< median, less what the cameras moved while the pictures were taken
+  /// Less what the cameras moved while the pictures were taken: the median less its standard error.
+  double unexplained_m = 0.0;
 };
 
 /// A place of the path.

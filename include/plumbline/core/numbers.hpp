@@ -11,6 +11,7 @@
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 namespace plumbline::core {
@@ -56,6 +57,17 @@ T quantile(std::vector<T> values, double q, T none = std::numeric_limits<T>::qui
       values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1) + 0.5);
   std::nth_element(values.begin(), place, values.end());
   return *place;
+}
+
+/// The median less one standard error of its rank, the quantile 1/2 - 1/(2 sqrt(n)) of n finite values: what
+/// the median is at least, even if they are few. `none` when there are none.
+template <typename T>
+T least_median(std::vector<T> values, T none = std::numeric_limits<T>::quiet_NaN()) {
+  values.erase(std::remove_if(values.begin(), values.end(), [](T v) { return !std::isfinite(v); }),
+               values.end());
+  if (values.empty()) return none;
+  const double rank = 0.5 - 0.5 / std::sqrt(static_cast<double>(values.size()));
+  return quantile(std::move(values), rank, none);
 }
 
 }  // namespace plumbline::core
