@@ -445,7 +445,15 @@ core::Result<void> Editor::apply(const Edit& edit) {
 }
 
 void Editor::finish() {
-  scene_.leaves.clear();  // their faces may have other numbers now
+  // Leaves keep their faces, whose numbers change.
+  std::vector<std::size_t> number{0};
+  for (const Face& face : scene_.faces) number.push_back(number.back() + (removed(face.object) ? 0 : 1));
+  for (DoorLeaf& leaf : scene_.leaves) {
+    const std::size_t end = number[leaf.first + leaf.count];
+    leaf.first = number[leaf.first];
+    leaf.count = end - leaf.first;
+  }
+
   scene_.faces.erase(std::remove_if(scene_.faces.begin(), scene_.faces.end(),
                                     [&](const Face& face) { return removed(face.object); }),
                      scene_.faces.end());

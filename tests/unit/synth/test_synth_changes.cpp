@@ -108,6 +108,28 @@ TEST(SynthChanges, ASeedChangesLayoutsAsTheTruthSays) {
   }
 }
 
+TEST(SynthChanges, LeavesAndTheLiftKeepTheirFacesWhenThingsGo) {
+  SynthOptions options = another_day(3, "");
+  options.lift = true;
+  const auto before = make_layout("building", options);
+  options.changes = "3";
+  const auto after = make_layout("building", options);
+  ASSERT_TRUE(before && after);
+  EXPECT_NE(after->faces.size(), before->faces.size());
+  EXPECT_FALSE(after->leaves.empty());
+  ASSERT_EQ(after->leaves.size(), before->leaves.size());
+
+  const auto object_of = [](const Scene& scene, std::size_t face) {
+    return scene.objects[static_cast<std::size_t>(scene.faces[face].object)].name;
+  };
+  for (std::size_t k = 0; k < after->leaves.size(); ++k) {
+    const DoorLeaf &was = before->leaves[k], &is = after->leaves[k];
+    ASSERT_EQ(is.count, was.count) << k;
+    for (std::size_t i = 0; i < is.count; ++i)
+      EXPECT_EQ(object_of(*after, is.first + i), object_of(*before, was.first + i)) << k;
+  }
+}
+
 TEST(SynthChanges, ASeedChangesShippedScenesAndLeavesTheirPathsFree) {
   for (const char* name : {"room", "office", "corridor", "structure"}) {
     const auto before = open_scene(name, {}, kScenesAsShipped);
