@@ -61,7 +61,8 @@ struct GapReport {
   std::size_t pairs = 0;
   double median_m = 0.0;  ///< length of the shift, less its own noise
   double p90_m = 0.0;
-  /// Less what the cameras moved while the pictures were taken: the median less its standard error.
+  /// The median of what is left without the motion of the cameras while the pictures were taken, less the
+  /// standard error of a median of so many pairs.
   double unexplained_m = 0.0;
 };
 

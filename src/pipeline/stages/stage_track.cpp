@@ -47,8 +47,8 @@ class TrackStage : public Stage {
                   "Use wheel odometry of a recording that has it, once its scale is known");
     table.choice<bool>(
         "camera.refine", refine_, {{"auto", true}, {"off", false}},
-        "Estimate the camera from the map, after 40 keyframes, 200 frames or 10 s and at the end, and "
-        "rebuild the map for it");
+        "Estimate the camera from the map, after 40 keyframes, 10 s, or 200 frames that take 6.5 s or more, "
+        "and at the end, and rebuild the map for it");
     table.integer("camera.pictures", pictures_, {1, 1'000'000}, "",
                   "Keyframes of each robot, from the first on, whose pictures are read again for a better "
                   "camera; a live run keeps no more of them");

@@ -227,6 +227,8 @@ std::optional<Editor::Slab> Editor::slab_of_plan(const Plan& plan, const std::st
   Slab slab;
   const auto number = core::to_number(wall);
   if (!number || *number < 0.0 || *number >= static_cast<double>(plan.walls.size())) return std::nullopt;
+
+  // The line in its middle, and half its thickness.
   const int index = static_cast<int>(*number);
   const PlanWall& w = plan.walls[static_cast<std::size_t>(index)];
   slab.origin = w.origin;

@@ -49,6 +49,7 @@ class CameraResume : public ProgramTest {
 
     ASSERT_GT(child, 0);
 
+    // Stopped while its folder is copied, the run leaves what a kill at that moment would.
     std::size_t next = 0;
     int status = 0;
     while (waitpid(child, &status, WNOHANG) == 0) {

@@ -119,6 +119,7 @@ TEST(SynthChanges, LeavesAndTheLiftKeepTheirFacesWhenThingsGo) {
   EXPECT_FALSE(after->leaves.empty());
   ASSERT_EQ(after->leaves.size(), before->leaves.size());
 
+  // Each leaf has as many faces as before, of the same objects.
   const auto object_of = [](const Scene& scene, std::size_t face) {
     return scene.objects[static_cast<std::size_t>(scene.faces[face].object)].name;
   };
