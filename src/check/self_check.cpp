@@ -110,6 +110,12 @@ class Check {
     if (!small) return tl::unexpected(small.error());
     return View{&cameras_[posed.frame.way], posed.poses, std::move(*small)};
   }
+  /// An anchor's view; its images are shared and must not be changed.
+  core::Result<View> anchor_view(std::size_t a) const {
+    if (a >= kept_.size() || kept_[a].gray.empty()) return view(anchors_[a]);
+    const PosedFrame& posed = frames_[anchors_[a]];
+    return View{&cameras_[posed.frame.way], posed.poses, kept_[a]};
+  }
 
   /// work(a) for each anchor, side by side; the first error.
   template <typename Work>
@@ -123,11 +129,15 @@ class Check {
   }
 
   core::Result<void> choose() {
+    // Each anchor has many partners: the images of the first ones, about 60 MB, are read once.
+    constexpr std::size_t kMostKept = 256;
+    kept_.resize(std::min(kMostKept, anchors_.size()));
     outlines_.resize(anchors_.size());
     auto done = for_anchors([&](std::size_t a) -> core::Result<void> {
       const auto anchor = view(anchors_[a]);
       if (!anchor) return tl::unexpected(anchor.error());
       outlines_[a] = outline_of(*anchor);
+      if (a < kept_.size()) kept_[a] = anchor->frame;
       return {};
     });
     if (done) partners_ = choose_pairs(frames_, anchors_, outlines_, cameras_);
@@ -138,7 +148,7 @@ class Check {
     std::vector<PairRows> next(anchors_.size());
     auto done = for_anchors([&](std::size_t a) -> core::Result<void> {
       if (!partners_[a].next) return {};
-      auto first = view(anchors_[a]);
+      auto first = anchor_view(a);
       const auto second = view(*partners_[a].next);
       if (!first || !second) return tl::unexpected((first ? second : first).error());
       next[a] = FirstView(std::move(*first)).depth_rows(*second);
@@ -151,14 +161,14 @@ class Check {
   core::Result<void> align() {
     std::vector<std::array<std::vector<AlignedPair>, kGaps>> aligned(anchors_.size());
     auto done = for_anchors([&](std::size_t a) -> core::Result<void> {
-      auto loaded = view(anchors_[a]);
+      auto loaded = anchor_view(a);
       if (!loaded) return tl::unexpected(loaded.error());
       FirstView first(std::move(*loaded));
 
       // Its partners, one gap after the other.
       for (std::size_t gap = 0; gap < kGaps; ++gap) {
         for (const std::size_t b : partners_[a].by_gap[gap]) {
-          const auto second = view(anchors_[b]);
+          const auto second = anchor_view(b);
           if (!second) return tl::unexpected(second.error());
 
           if (auto pair = align(first, *second, gap)) {
@@ -402,6 +412,7 @@ class Check {
   std::vector<SmallCamera> cameras_;  ///< by way
   std::vector<PosedFrame> frames_;
   std::vector<std::size_t> anchors_;  ///< among frames_
+  std::vector<SmallFrame> kept_;      ///< images of the first anchors
   std::vector<Outline> outlines_;     ///< by anchor
   std::vector<Partners> partners_;    ///< by anchor
   DepthNoise noise_;

@@ -230,7 +230,8 @@ struct CheckContext {
   [[nodiscard]] std::filesystem::path find(const std::string& file, const core::ConfigMark& mark) const;
 };
 
-/// Life of a stage: constructed, declare, check, start, process once a frame, finish, report, doubt.
+/// Life of a stage: constructed, declare, check, start, process once a frame, finish, settle, report,
+/// doubt.
 class Stage {
  public:
   virtual ~Stage() = default;
@@ -257,6 +258,9 @@ class Stage {
   /// Called after the last frame, in graph order; reads and writes the ports of Rate::kEnd. Stages that
   /// export and do not need one another finish at the same time.
   virtual core::Result<void> finish(StageIo& /*io*/) { return {}; }
+  /// Called after the ends of all stages, in graph order: waits for work that finish() left in the
+  /// background, on which no other stage's end depends.
+  virtual void settle() {}
   /// Exports to make from the result folder once everything else in it is written, in the formats of
   /// plumbline export; outputs are named below it. Called after check. Null: none.
   [[nodiscard]] virtual const std::vector<exports::ExportRequest>* wanted_exports() const { return nullptr; }

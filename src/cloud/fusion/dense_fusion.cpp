@@ -5,6 +5,7 @@
 #include <pcl/point_types.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -89,6 +90,8 @@ class Fusion {
     std::vector<core::Result<void>> done(count);
     rasters_.resize(count);
     is_depth_view_.assign(count, 0);
+    read_.resize(count);
+    std::atomic<std::size_t> kept_bytes{0};
 
     executor_.parallel_for(count, [&](std::size_t v) {
       const auto cloud = views_.read(v);
@@ -102,6 +105,11 @@ class Fusion {
       is_depth_view_[v] = is_depth_view(**cloud, views_.cameras[v]) ? 1 : 0;
       if (is_depth_view_[v] == 0) cells[v] = color_cells(**cloud, world_from_cloud_[v], kCell_m);
       if (options_.free_space) rasters_[v] = depth_raster(**cloud, views_.cameras[v]);
+
+      // Those that fit into half the memory of a tile are not read a second time.
+      const std::size_t bytes = (*cloud)->size() * sizeof(Point);
+      if (is_depth_view_[v] == 0 && kept_bytes.fetch_add(bytes) + bytes <= most_kept_bytes())
+        read_[v] = *cloud;
     });
 
     if (auto failed = first_error(done); !failed) return failed;
@@ -170,15 +178,24 @@ class Fusion {
     }
   }
 
-  core::Result<void> measure(std::size_t v, std::vector<VoxelSample>& samples) const {
-    const auto cloud = views_.read(v);
-    if (!cloud) return tl::unexpected<core::Error>(cloud.error());
-    if (!gains_.empty()) apply_gain(**cloud, gains_[v]);
+  core::Result<void> measure(std::size_t v, std::vector<VoxelSample>& samples) {
+    // A view that reaches into tiles filled later is read again for these.
+    CloudPtr cloud = std::exchange(read_[v], nullptr);
+    if (cloud == nullptr) {
+      auto again = views_.read(v);
+      if (!again) return tl::unexpected<core::Error>(again.error());
+      cloud = std::move(*again);
+    }
+    if (!gains_.empty()) apply_gain(*cloud, gains_[v]);
 
     // Robots are counted only if there are several
     const std::uint8_t robot = several_robots() ? views_.robots[v] : std::uint8_t{0};
-    samples = VoxelMap::measured(**cloud, world_from_cloud_[v], options_.voxels, robot);
+    samples = VoxelMap::measured(*cloud, world_from_cloud_[v], options_.voxels, robot);
     return {};
+  }
+
+  [[nodiscard]] std::size_t most_kept_bytes() const {
+    return static_cast<std::size_t>(0.5e6 * options_.tile_mb);
   }
 
   /// Estimate for all tiles, from the first ones and with some reserve: reserved memory costs nothing until
@@ -322,6 +339,7 @@ class Fusion {
   std::vector<FusionTile> tiles_;
   std::vector<DepthRaster> rasters_;         ///< by view; empty ones without free space
   std::vector<std::uint8_t> is_depth_view_;  ///< by view
+  std::vector<CloudPtr> read_;               ///< by view; null: to be read again
   std::vector<Eigen::Vector3f> gains_;       ///< by view; empty: colours are not changed
   CellMap<PoseNoise> pose_noise_;            ///< by cell; empty: not known
 };

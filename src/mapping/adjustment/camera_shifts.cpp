@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "plumbline/mapping/adjustment/map_recalibration.hpp"
 
@@ -27,19 +28,22 @@ std::vector<maps::FramePose> only_keyframes(const std::vector<maps::FramePose>& 
   return some;
 }
 
-/// The map as another camera would have made it.
-maps::Map map_of(const maps::Map& map, std::vector<maps::FramePose> frames,
-                 const sensor::Recalibration& change) {
-  maps::Map other = map;
-  recalibrate_map(change, other, frames);
-  return other;
+/// Poses by keyframe; one that has none stays where it is in the map.
+std::map<core::KeyframeId, geometry::Rigid3> poses_with(const sensor::Recalibration& change,
+                                                        const maps::Map& map,
+                                                        const std::vector<maps::FramePose>& keyframes) {
+  const KeyframePoses found = recalibrated_poses(change, map, keyframes);
+  std::map<core::KeyframeId, geometry::Rigid3> poses(found.begin(), found.end());
+  for (const core::KeyframeId id : map.keyframe_ids()) poses.emplace(id, map.camera_from_world(id));
+  return poses;
 }
 
-/// Motions of the keyframes from one map to another, each in its camera's axes.
-std::vector<Vector6d> motions_between(const maps::Map& map, const maps::Map& other) {
+/// Motions of the keyframes from their poses before to those after, each in its camera's axes.
+std::vector<Vector6d> motions_between(const std::map<core::KeyframeId, geometry::Rigid3>& before,
+                                      const std::map<core::KeyframeId, geometry::Rigid3>& after) {
   std::vector<Vector6d> motions;
-  for (const core::KeyframeId id : map.keyframe_ids()) {
-    const geometry::Rigid3 step = map.camera_from_world(id) * other.camera_from_world(id).inverse();
+  for (const auto& [id, camera_from_world] : before) {
+    const geometry::Rigid3 step = camera_from_world * after.at(id).inverse();
     Vector6d motion;
     motion << step.translation, geometry::log_so3(step.rotation);
     motions.push_back(motion);
@@ -65,7 +69,7 @@ std::vector<KeyframeShift> camera_shifts(const maps::Map& map, const std::vector
   const optimize::CameraChange sigma = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
 
   // Even if the camera stays, rows are corrected anew by the final velocities: no effect of the camera.
-  const maps::Map same = map_of(map, keyframes, sensor::Recalibration(image, camera, camera));
+  const auto same = poses_with(sensor::Recalibration(image, camera, camera), map, keyframes);
 
   // One standard deviation of each number.
   std::vector<std::vector<Vector6d>> by_number(kCameraUnknowns);
@@ -73,7 +77,7 @@ std::vector<KeyframeShift> camera_shifts(const maps::Map& map, const std::vector
     optimize::CameraChange change = optimize::change_between(camera, camera);
     change[static_cast<Eigen::Index>(u)] += sigma[static_cast<Eigen::Index>(u)];
     const sensor::Recalibration to(image, camera, optimize::changed_camera(camera, change));
-    by_number[u] = motions_between(same, map_of(map, keyframes, to));
+    by_number[u] = motions_between(same, poses_with(to, map, keyframes));
   });
 
   // Their combinations that are independent.

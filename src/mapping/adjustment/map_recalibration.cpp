@@ -86,48 +86,29 @@ Rigid3 aligned(const std::vector<SharedPlace>& places, const sensor::Pinhole& im
   return b_from_a;
 }
 
-class MapRecalibration {
+/// What another camera would have measured between the images of a map, which stays as it is.
+class NewMeasurements {
  public:
-  MapRecalibration(const sensor::Recalibration& change, maps::Map& map, std::vector<maps::FramePose>& frames)
-      : change_(change), map_(map), frames_(frames), path_(maps::trajectory(frames, map)) {
+  NewMeasurements(const sensor::Recalibration& change, const maps::Map& map,
+                  const std::vector<maps::FramePose>& frames)
+      : change_(change), path_(maps::trajectory(frames, map)) {
     for (const KeyframeId id : map.keyframe_ids()) {
-      before_[id] = map.camera_from_world(id);
       images_[id] = image_of(map.keyframe(id).stamp, map.keyframe(id).features.get());
       samples_[id] = samples_of(map.keyframe(id));
     }
   }
 
-  void run() {
-    const std::vector<PoseEdge> relative = relative_poses();  // the map's, corrected
-    correct_edges();
-    correct_frames();
-
-    recalibrate_keyframes();
-    move_keyframes(relative);
-    move_landmarks();
-  }
-
- private:
-  [[nodiscard]] ImageChange image_of(double stamp, const features::FrameFeatures* features) const {
-    ImageChange image;
-    image.change = &change_;
-    image.velocity = geometry::velocity_at(path_, stamp);
-    if (features != nullptr) image.shutter_before = features->shutter_motion;
-    return image;
-  }
-
+  [[nodiscard]] const std::map<KeyframeId, ImageChange>& images() const { return images_; }
+  [[nodiscard]] const ImageChange& image(KeyframeId id) const { return images_.at(id); }
   /// For frames that are not keyframes: their own motion corrected the rolling shutter.
   [[nodiscard]] ImageChange image_of(const maps::FramePose& frame) const {
     ImageChange image = image_of(frame.stamp, nullptr);
     image.shutter_before = change_.before().camera().readout_s.value_or(0.0) * image.velocity;
     return image;
   }
-
-  [[nodiscard]] std::vector<maps::SurfaceSample> samples_of(const maps::Keyframe& keyframe) const {
-    const std::size_t step = std::max<std::size_t>(1, keyframe.surface.size() / kSamples);
-    std::vector<maps::SurfaceSample> samples;
-    for (std::size_t i = 0; i < keyframe.surface.size(); i += step) samples.push_back(keyframe.surface[i]);
-    return samples;
+  /// Surface that a keyframe saw with the camera before.
+  [[nodiscard]] const std::vector<maps::SurfaceSample>& surface(KeyframeId id) const {
+    return samples_.at(id);
   }
 
   /// The relative pose that the new camera would have measured: places seen in both images stay aligned, in
@@ -154,20 +135,61 @@ class MapRecalibration {
     return corrected(b_from_a, images_.at(a), images_.at(b), samples_.at(a));
   }
 
-  [[nodiscard]] std::vector<PoseEdge> relative_poses() const {
-    std::vector<PoseEdge> edges = map_edges(map_);
+  /// The map's own relative poses, corrected.
+  [[nodiscard]] std::vector<PoseEdge> relative_poses(const maps::Map& map) const {
+    std::vector<PoseEdge> edges = map_edges(map);
     for (PoseEdge& edge : edges) edge.b_from_a = corrected(edge.b_from_a, edge.a, edge.b);
     return edges;
   }
 
+ private:
+  [[nodiscard]] ImageChange image_of(double stamp, const features::FrameFeatures* features) const {
+    ImageChange image;
+    image.change = &change_;
+    image.velocity = geometry::velocity_at(path_, stamp);
+    if (features != nullptr) image.shutter_before = features->shutter_motion;
+    return image;
+  }
+
+  [[nodiscard]] static std::vector<maps::SurfaceSample> samples_of(const maps::Keyframe& keyframe) {
+    const std::size_t step = std::max<std::size_t>(1, keyframe.surface.size() / kSamples);
+    std::vector<maps::SurfaceSample> samples;
+    for (std::size_t i = 0; i < keyframe.surface.size(); i += step) samples.push_back(keyframe.surface[i]);
+    return samples;
+  }
+
+  const sensor::Recalibration& change_;
+  geometry::Trajectory path_;  ///< before the change
+  std::map<KeyframeId, ImageChange> images_;
+  std::map<KeyframeId, std::vector<maps::SurfaceSample>> samples_;  ///< surfaces before the change
+};
+
+class MapRecalibration {
+ public:
+  MapRecalibration(const sensor::Recalibration& change, maps::Map& map, std::vector<maps::FramePose>& frames)
+      : change_(change), map_(map), frames_(frames), now_(change, map, frames) {
+    for (const KeyframeId id : map.keyframe_ids()) before_[id] = map.camera_from_world(id);
+  }
+
+  void run() {
+    const std::vector<PoseEdge> relative = now_.relative_poses(map_);
+    correct_edges();
+    correct_frames();
+
+    recalibrate_keyframes();
+    move_keyframes(relative);
+    move_landmarks();
+  }
+
+ private:
   void correct_edges() {
     for (auto [number, edge] : map_.edges()) {
-      edge.b_from_a = corrected(edge.b_from_a, edge.a, edge.b);
+      edge.b_from_a = now_.corrected(edge.b_from_a, edge.a, edge.b);
       map_.replace_edge(number, edge);
     }
 
     std::vector<maps::LoopEdge> loops = map_.loops();
-    for (maps::LoopEdge& loop : loops) loop.b_from_a = corrected(loop.b_from_a, loop.a, loop.b);
+    for (maps::LoopEdge& loop : loops) loop.b_from_a = now_.corrected(loop.b_from_a, loop.a, loop.b);
     map_.set_loops(std::move(loops));
   }
 
@@ -182,20 +204,21 @@ class MapRecalibration {
         continue;
       }
 
-      const ImageChange image = image_of(frame);
+      const ImageChange image = now_.image_of(frame);
       const Rigid3 before = frame.camera_from_reference;
 
       // Frames between keyframes store no surface: that of the previous frame's keyframe is
       // used, moved to the previous frame.
       if (frame.camera_from_previous && previous != nullptr) {
         const std::vector<maps::SurfaceSample> seen =
-            tracking::transformed(samples_.at(previous->reference), previous_before);
-        frame.camera_from_previous = corrected(*frame.camera_from_previous, image_of(*previous), image, seen);
+            tracking::transformed(now_.surface(previous->reference), previous_before);
+        frame.camera_from_previous =
+            now_.corrected(*frame.camera_from_previous, now_.image_of(*previous), image, seen);
       }
 
       if (maps::is_between_keyframes(frame, map_)) {
         frame.camera_from_reference =
-            corrected(before, images_.at(frame.reference), image, samples_.at(frame.reference));
+            now_.corrected(before, now_.image(frame.reference), image, now_.surface(frame.reference));
       }
 
       previous = &frame;
@@ -204,7 +227,7 @@ class MapRecalibration {
   }
 
   void recalibrate_keyframes() {
-    for (const auto& [id, image] : images_) {
+    for (const auto& [id, image] : now_.images()) {
       auto keyframe = std::make_shared<maps::Keyframe>(map_.keyframe(id));
       if (keyframe->features != nullptr) {
         auto features = std::make_shared<features::FrameFeatures>(*keyframe->features);
@@ -215,7 +238,8 @@ class MapRecalibration {
       for (maps::SurfaceSample& sample : keyframe->surface)
         maps::recalibrate(change_, image.velocity, sample);
       if (keyframe->reference.valid() && map_.has_keyframe(keyframe->reference)) {
-        keyframe->camera_from_reference = corrected(keyframe->camera_from_reference, keyframe->reference, id);
+        keyframe->camera_from_reference =
+            now_.corrected(keyframe->camera_from_reference, keyframe->reference, id);
       }
 
       map_.replace_keyframe(std::move(keyframe));
@@ -254,7 +278,7 @@ class MapRecalibration {
       if (p.z() < kNearest_m) continue;
 
       sum += map_.camera_from_world(o.keyframe).inverse() *
-             images_.at(o.keyframe).place(p, before.rotation * normal);
+             now_.image(o.keyframe).place(p, before.rotation * normal);
       ++count;
     }
 
@@ -278,10 +302,8 @@ class MapRecalibration {
   const sensor::Recalibration& change_;
   maps::Map& map_;
   std::vector<maps::FramePose>& frames_;
-  geometry::Trajectory path_;            ///< path before the change
+  NewMeasurements now_;
   std::map<KeyframeId, Rigid3> before_;  ///< poses before the change
-  std::map<KeyframeId, ImageChange> images_;
-  std::map<KeyframeId, std::vector<maps::SurfaceSample>> samples_;  ///< surfaces before the change
 };
 
 }  // namespace
@@ -289,6 +311,11 @@ class MapRecalibration {
 void recalibrate_map(const sensor::Recalibration& change, maps::Map& map,
                      std::vector<maps::FramePose>& frames) {
   MapRecalibration(change, map, frames).run();
+}
+
+KeyframePoses recalibrated_poses(const sensor::Recalibration& change, const maps::Map& map,
+                                 const std::vector<maps::FramePose>& frames) {
+  return solve_trusted_graph(map, NewMeasurements(change, map, frames).relative_poses(map));
 }
 
 GlobalAdjustmentSummary adjust_recalibrated_map(const sensor::Pinhole& camera, const FusionOptions& fusion,

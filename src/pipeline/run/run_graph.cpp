@@ -282,6 +282,13 @@ class Runner {
       }
     }
 
+    for (Node& node : graph_.nodes) {
+      auto settled = guarded(node.name, [&]() -> core::Result<void> {
+        node.stage->settle();
+        return {};
+      });
+      if (!settled) return settled;
+    }
     return {};
   }
 

@@ -36,6 +36,7 @@ class ReadStage : public Stage {
   core::Result<void> start(const RunContext& context) override {
     source_ = context.input.source;
     log_ = context.log;
+    executor_ = context.executor;
     asked_ = &context.asked;
     recordings_ = context.input.recordings;
     const bool live = recordings_ != nullptr && recordings_->live() != nullptr;
@@ -109,8 +110,17 @@ class ReadStage : public Stage {
       return core::input_error(fmt::format("{}: none of {} frames could be read; see the warnings above",
                                            source_->name(), io.frame()));
     }
-    if (!asked_->stop_requested()) look_for_signs();
+
+    // The samples are complete, and nothing else at the end depends on what is found in them.
+    if (!asked_->stop_requested()) search_ = executor_->submit([this] { look_for_signs(); });
     return {};
+  }
+  void settle() override {
+    search_.wait();
+    for (std::size_t r = 0; r < found_.size(); ++r) {
+      const std::string name = found_.size() > 1 ? recordings_->robot(static_cast<std::int32_t>(r)).name : "";
+      add_signs(name, std::move(found_[r]), *log_, signs_);
+    }
   }
 
   void report(Json& summary) const override {
@@ -136,7 +146,8 @@ class ReadStage : public Stage {
   void look_for_signs() {
     still_ = !samples_.empty();
     for (std::size_t r = 0; r < samples_.size(); ++r) {
-      std::vector<diagnose::Sign> signs = diagnose::signs_of(*samples_[r]);
+      std::vector<diagnose::Sign>& signs = found_.emplace_back();
+      signs = diagnose::signs_of(*samples_[r]);
       const auto number = static_cast<std::int32_t>(r);
 
       // Poses that came along, as they were read.
@@ -151,16 +162,17 @@ class ReadStage : public Stage {
 
       still_ = still_ && diagnose::stood_still(*samples_[r]);
       samples_[r].reset();
-      add_signs(samples_.size() > 1 ? recordings_->robot(number).name : "", std::move(signs), *log_, signs_);
     }
     samples_.clear();
   }
 
   const dataset::FrameSource* source_ = nullptr;
   core::Log* log_ = nullptr;
+  const core::Executor* executor_ = nullptr;
   const core::StopToken* asked_ = nullptr;
   const RobotRecordings* recordings_ = nullptr;
   std::vector<std::unique_ptr<diagnose::Samples>> samples_;  ///< by robot
+  std::vector<std::vector<diagnose::Sign>> found_;           ///< by robot
   std::vector<diagnose::Sign> signs_;
   bool still_ = false;
   geometry::PoseConvention poses_are_ = geometry::PoseConvention::kWorldFromCamera;
@@ -168,6 +180,7 @@ class ReadStage : public Stage {
   std::atomic<std::size_t> read_{0};
   std::atomic<std::size_t> unreadable_{0};
   std::atomic<std::size_t> odometry_{0};
+  core::Executor::Job search_;  ///< for signs; last, so that it ends before what it uses
 };
 
 }  // namespace

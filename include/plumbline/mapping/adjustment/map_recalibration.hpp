@@ -26,6 +26,11 @@ namespace plumbline::mapping {
 void recalibrate_map(const sensor::Recalibration& change, maps::Map& map,
                      std::vector<maps::FramePose>& frames);
 
+/// Poses that the keyframes of one robot's map would have with the new camera: those of recalibrate_map,
+/// which this does not need to run. Empty if no poses could be found.
+KeyframePoses recalibrated_poses(const sensor::Recalibration& change, const maps::Map& map,
+                                 const std::vector<maps::FramePose>& frames);
+
 /// Reads a keyframe's picture again, by its number in the recording, with the new camera; none: it cannot be
 /// read. Called from several threads at a time.
 using PictureReader = std::function<std::optional<sensor::RgbdFrame>(std::int64_t frame_index)>;
