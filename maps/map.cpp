@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include "plumbline/core/release.hpp"
+
 namespace plumbline::maps {
 namespace {
 
@@ -79,7 +81,7 @@ void Map::erase_patches(KeyframeId id) {
   std::shared_ptr<const Keyframe>& data = keyframes_.at(id).data;
   if (data->features == nullptr || data->features->patches.empty()) return;
   auto features = std::make_shared<features::FrameFeatures>(*data->features);
-  features->patches = {};
+  core::release(features->patches);
   auto keyframe = std::make_shared<Keyframe>(*data);
   keyframe->features = std::move(features);
   data = std::move(keyframe);

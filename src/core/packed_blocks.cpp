@@ -7,6 +7,8 @@
 #include <cerrno>
 #include <utility>
 
+#include "plumbline/core/release.hpp"
+
 namespace plumbline::core {
 namespace {
 
@@ -52,7 +54,7 @@ std::size_t PackedBlocks::add(const Bytes& block) {
   bytes_ += place.size;
   if (write(place)) {
     end_ += static_cast<off_t>(place.size);
-    place.packed = {};
+    release(place.packed);
   }
   places_.push_back(std::move(place));
   return places_.size() - 1;

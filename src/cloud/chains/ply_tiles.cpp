@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "io/shift.hpp"
+#include "plumbline/core/release.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -163,7 +164,7 @@ core::Result<void> PlyTiles::write_waiting() {
               static_cast<std::streamsize>(tile.waiting.size()));
     out.close();
     if (!out) return cannot_write(file);
-    tile.waiting = {};
+    core::release(tile.waiting);
   }
   waiting_ = 0;
   return {};

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "plumbline/core/release.hpp"
 #include "plumbline/features/depth_delay.hpp"
 #include "plumbline/mapping/local_mapping/landmark_normal.hpp"
 
@@ -97,7 +98,7 @@ core::KeyframeId LocalMapper::insert(maps::Map& map, const sensor::RgbdFrame& fr
   add_lines(map, id);
   if (!begins_component) map.attach(id);
   if (options_.triangulate && !distorted(map, id)) triangulate(map, id, {levels, *own});
-  own->slants = {};  // corners do not move from here on
+  core::release(own->slants);  // corners do not move from here on
   return id;
 }
 
