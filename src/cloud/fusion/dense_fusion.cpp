@@ -106,7 +106,7 @@ class Fusion {
       if (is_depth_view_[v] == 0) cells[v] = color_cells(**cloud, world_from_cloud_[v], kCell_m);
       if (options_.free_space) rasters_[v] = depth_raster(**cloud, views_.cameras[v]);
 
-      // Those that fit into half the memory of a tile are not read a second time.
+      // Clouds that fit into half the memory of a tile are not read a second time.
       const std::size_t bytes = (*cloud)->size() * sizeof(Point);
       if (is_depth_view_[v] == 0 && kept_bytes.fetch_add(bytes) + bytes <= most_kept_bytes())
         read_[v] = *cloud;

@@ -86,7 +86,7 @@ Rigid3 aligned(const std::vector<SharedPlace>& places, const sensor::Pinhole& im
   return b_from_a;
 }
 
-/// What another camera would have measured between the images of a map, which stays as it is.
+/// The measurements of another camera between the images of a map, which is not changed.
 class NewMeasurements {
  public:
   NewMeasurements(const sensor::Recalibration& change, const maps::Map& map,
