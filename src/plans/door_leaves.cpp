@@ -137,6 +137,7 @@ std::vector<WallDoor> windows_of(const cloud::Cloud& cloud, double floor_m, doub
 
   for (WallLine& wall : walls) {
     for (WallOpening& gap : wall.gaps) {
+      if (gap.to_floor) continue;
       WallDoor window;
       window.kind = OpeningKind::kWindow;
       window.jambs = {wall.at(gap.s0), wall.at(gap.s1)};

@@ -30,6 +30,9 @@ bool open_column(const WallRaster& raster, int column, const Cut& cut) {
 bool is_passage(const WallRaster& raster, int a, int b, const Cut& cut) {
   constexpr double kLeastCrossed = 0.08;
   constexpr double kLeastLintel = 0.3;
+  constexpr double kLeastOpen = 0.5;
+  const double open = mean_share(a, b, [&](int c) { return open_column(raster, c, cut) ? 1.0 : 0.0; });
+  if (cut.rays_known && open < kLeastOpen) return false;
   const auto crossed = [&](double low_m, double high_m) {
     return mean_share(a, b, [&](int c) { return raster.crossed(c, low_m, high_m); });
   };
@@ -114,6 +117,26 @@ WallLine joined_pieces(const WallLine& a, const WallLine& b) {
   return line;
 }
 
+/// Lets an opening at the end of one of two pieces in line reach to the other piece, up to which there is no
+/// wall either: its lintel was not seen there. False: neither has one.
+bool fill_with_opening(WallLine& a, WallLine& b) {
+  constexpr double kAtEnd_m = 0.1;
+  const double a_end = a.s1, b_start = b.s0;
+  for (WallOpening& opening : a.openings) {
+    const double to = a.along().dot(b.at(b_start));
+    if (std::abs(opening.s1 - a_end) > kAtEnd_m || to - opening.s0 > kWidestPassage_m) continue;
+    opening.s1 = to;
+    return true;
+  }
+  for (WallOpening& opening : b.openings) {
+    const double from = b.along().dot(a.at(a_end));
+    if (std::abs(opening.s0 - b_start) > kAtEnd_m || opening.s1 - from > kWidestPassage_m) continue;
+    opening.s0 = from;
+    return true;
+  }
+  return false;
+}
+
 /// Makes both ends of the same opening, on the two sides of a wall, lie opposite each other.
 void level_openings(const WallLine& a, WallOpening& of_a, const WallLine& b, WallOpening& of_b) {
   constexpr double kAlike_m = 0.05;
@@ -167,7 +190,7 @@ void bridge_gaps(std::vector<WallLine>& walls, std::vector<Fronts>& fronts, cons
   for (std::size_t i = 0; i < walls.size(); ++i) {
     for (std::size_t j = 0; j < walls.size(); ++j) {
       WallLine& a = walls[i];
-      const WallLine& b = walls[j];
+      WallLine& b = walls[j];
       if (i == j || a.corner[1] >= 0 || b.corner[0] >= 0 || a.normal.dot(b.normal) < 0.998) continue;
 
       // Pieces in line with a short gap
@@ -180,12 +203,13 @@ void bridge_gaps(std::vector<WallLine>& walls, std::vector<Fronts>& fronts, cons
       const WallRaster& front = *fronts[i].last;
       const bool crossed = is_passage(front, front.column_at(a.at(a.s1)), front.column_at(b.at(b.s0)),
                                       {cut.at_m, cut.low_m, cut.high_m, true});
-      if (crossed ? gap < kNarrowestDoor_m : gap > kLongest_m) continue;
+      const bool rest = crossed && gap < kNarrowestDoor_m && fill_with_opening(a, b);
+      if (crossed ? gap < kNarrowestDoor_m && !rest : gap > kLongest_m) continue;
 
       // An opening, else hidden wall with its gaps
-      if (crossed || !cut.rays_known) {
+      if (!rest && (crossed || !cut.rays_known)) {
         a.openings.push_back(widened(front, a, {a.s1, from}, cut));
-      } else {
+      } else if (!rest) {
         const std::vector<WallOpening> gaps = gaps_between(front, a.s1, from, cut);
         a.gaps.insert(a.gaps.end(), gaps.begin(), gaps.end());
       }
@@ -265,9 +289,14 @@ std::vector<WallDoor> doors_between_sides(const std::vector<WallLine>& walls,
         const double gap = (end == 0 ? -1.0 : 1.0) * a.along().dot(far - jamb);
         if (gap < kNarrowestDoor_m || gap > kWidestDoor_m) continue;
 
-        const WallRaster& front = end == 0 ? *fronts[i].first : *fronts[i].last;
-        const int c0 = front.column_at(jamb), c1 = front.column_at(far);
-        if (!is_passage(front, std::min(c0, c1), std::max(c0, c1), cut)) continue;
+        const auto is_open = [&](const WallRaster& front) {
+          const int c0 = front.column_at(jamb), c1 = front.column_at(far);
+          return is_passage(front, std::min(c0, c1), std::max(c0, c1), cut);
+        };
+        const auto front_of = [&](std::size_t wall) {
+          return end == 0 ? fronts[wall].first : fronts[wall].last;
+        };
+        if (!is_open(*front_of(i)) || !is_open(*front_of(j))) continue;
         const Eigen::Vector2d across = (a.normal.dot(far) - a.offset_m) * a.normal;
         doors.push_back({{jamb, far - across}, {jamb + across, far}, gap});
       }
@@ -382,6 +411,35 @@ std::vector<WallDoor> doors_at_free_ends(const std::vector<WallLine>& walls,
     }
   }
 
+  return found;
+}
+
+/// Openings wider than doors between two faces that lie on one line and end there, if not at a jamb.
+std::vector<WallDoor> passages_in_line(const std::vector<WallLine>& walls,
+                                       const std::vector<WallDoor>& doors) {
+  constexpr double kSameLine_m = 0.025;
+  const auto ends_there = [&](const WallLine& wall, std::size_t end) {
+    return wall.corner[end] < 0 ||
+           walls[static_cast<std::size_t>(wall.corner[end])].length() < kThickestWall_m;
+  };
+  std::vector<WallDoor> found;
+  for (const WallLine& a : walls) {
+    for (const WallLine& b : walls) {
+      if (&a == &b || !ends_there(a, 1) || !ends_there(b, 0) || a.normal.dot(b.normal) < 0.998) continue;
+
+      // Ends of both that look at each other
+      const Eigen::Vector2d from = a.at(a.s1), to = b.at(b.s0);
+      const double gap = a.along().dot(to - from);
+      if (gap <= kWidestDoor_m || gap > kWidestPassage_m || is_at_door(a, from, doors) ||
+          std::abs(a.normal.dot(to - from)) > kSameLine_m)
+        continue;
+      WallDoor door;
+      door.jambs = {from, to};
+      door.far_jambs = door.jambs;
+      door.width_m = gap;
+      found.push_back(door);
+    }
+  }
   return found;
 }
 

@@ -2,6 +2,7 @@
 // Tells walls from tall furniture and door leaves.
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include "wall_steps.hpp"
@@ -9,28 +10,28 @@
 namespace plumbline::plans {
 namespace {
 
-/// True if two sides lie on one line, one behind the other.
+/// True if two sides lie on one line, one behind the other. The longer one tells where the line goes.
 bool in_line(const WallLine& a, const WallLine& b) {
   constexpr double kSameLine_m = 0.03;
-  return a.normal.dot(b.normal) > 0.998 &&
-         std::abs(a.normal.dot(b.at(0.5 * (b.s0 + b.s1))) - a.offset_m) < kSameLine_m;
+  const auto& [line, other] = a.length() < b.length() ? std::tie(b, a) : std::tie(a, b);
+  return line.normal.dot(other.normal) > 0.998 &&
+         std::abs(line.normal.dot(other.at(0.5 * (other.s0 + other.s1))) - line.offset_m) < kSameLine_m;
 }
 
-/// True if cameras looked over it, where its upper edge was seen at all.
-bool is_looked_over(const WallLine& side, const WallRaster& raster) {
+/// Share of a side's columns, of those that reach at least as high as tall furniture, over whose upper edge
+/// cameras looked. No ray passes over a wall's edge, however little of its upper part was seen.
+double looked_over(const WallLine& side, const WallRaster& raster) {
   constexpr double kLeastTop_m = 1.5;
   constexpr double kGap_m = 0.1;
-  constexpr double kAbove_m = 0.5;
-  constexpr double kCrossed = 0.3;
-  constexpr double kShare = 0.3;
+  constexpr double kAbove_m = 0.6;
   int columns = 0, over = 0;
   for (int c = raster.column_of(side.s0); c <= raster.column_of(side.s1); ++c) {
     const double top = raster.top(c);
     if (top < kLeastTop_m) continue;
     ++columns;
-    if (raster.crossed(c, top + kGap_m, top + kAbove_m) >= kCrossed) ++over;
+    if (raster.crossed(c, top + kGap_m, top + kAbove_m) > 0.0) ++over;
   }
-  return over > kShare * columns;
+  return columns > 0 ? static_cast<double>(over) / columns : 0.0;
 }
 
 /// True if walls that face the same way run a little behind the side: along most of it, so that they were
@@ -90,16 +91,43 @@ bool are_faces(const WallLine& a, const WallLine& b) {
   return std::min(a.s1, last) - std::max(a.s0, first) > kShare * std::max(a.length(), b.length());
 }
 
-/// True if a short side is neither parallel nor square to any long one: a curtain, or a leaf that is ajar.
+/// True if a short side is neither parallel nor square to any long one, nor one face of a wall: a curtain, or
+/// a leaf that is ajar.
 bool is_askew(const WallLine& side, const std::vector<WallLine>& walls) {
   constexpr double kShort_m = 0.6;
   constexpr double kLong_m = 1.5;
   constexpr double kTurn = 0.07;  // sine of 4 degrees
   return side.length() < kShort_m && std::none_of(walls.begin(), walls.end(), [&](const WallLine& other) {
+           if (are_faces(side, other)) return true;
            const double parallel = std::abs(side.normal.dot(other.normal));
            const double square = std::abs(side.normal.dot(other.along()));
            return other.length() >= kLong_m && std::min(parallel, square) < kTurn;
          });
+}
+
+constexpr double kShortestLeaf_m = 0.4;  ///< of what was seen of it
+constexpr double kWidestLeaf_m = 1.3;    ///< as in find_leaves()
+
+/// True if an end of a side is at a jamb of an opening of the wall that is about as wide as the side is long.
+bool hangs_at(const WallLine& side, double end, const WallLine& wall, const WallRaster& raster,
+              const Cut& cut) {
+  constexpr double kHinge_m = 0.15, kOff_m = 0.3;
+  constexpr double kAlike_m = 0.2;    // hinge and edge of a leaf may be hidden
+  constexpr double kLeastTurn = 0.3;  // sine of 17 degrees, the smallest angle of find_leaves()
+
+  // The place where the side's line meets the wall's
+  const double turn = wall.normal.dot(side.along());
+  if (std::abs(turn) < kLeastTurn) return false;
+  const double off = (wall.offset_m - wall.normal.dot(side.at(end))) / turn;
+  const double s = wall.along().dot(side.at(end + off));
+  if (std::abs(off) > kOff_m || s < wall.s0 - kWidestLeaf_m || s > wall.s1 + kWidestLeaf_m) return false;
+
+  // An opening that begins or ends there
+  const auto openings = openings_between(raster, s - 2.0 * kWidestLeaf_m, s + 2.0 * kWidestLeaf_m, cut);
+  return std::any_of(openings.begin(), openings.end(), [&](const WallOpening& opening) {
+    return std::min(std::abs(opening.s0 - s), std::abs(opening.s1 - s)) < kHinge_m &&
+           std::abs(opening.s1 - opening.s0 - side.length()) < kAlike_m;
+  });
 }
 
 }  // namespace
@@ -115,10 +143,11 @@ void drop_low_furniture(std::vector<WallLine>& walls) {
   walls.erase(std::remove_if(walls.begin(), walls.end(), is_furniture), walls.end());
 }
 
-/// Drops low sides that cameras saw over, and sides that stand before a wall.
+/// Drops sides that cameras saw over, and sides that stand before a wall.
 void drop_furniture(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, bool rays_known) {
-  constexpr double kLongest_m = 3.0;  // longest furniture
-  constexpr double kLeastHigh = 0.2;  // share of a side that must be higher than furniture
+  constexpr double kLongest_m = 3.0;              // longest furniture
+  constexpr double kLeastHigh = 0.2;              // share of a side that must be higher than furniture
+  constexpr double kOver = 0.1, kOverHigh = 0.3;  // walls: up to 0.03 (docs/notes/2026-11-29-plans.md)
   const std::vector<WallLine> all = walls;
   keep_sides(walls, rasters, [&](std::size_t i) {
     // Two low faces of a thin wall are a wall
@@ -126,9 +155,25 @@ void drop_furniture(std::vector<WallLine>& walls, std::vector<WallRaster>& raste
                       std::any_of(all.begin(), all.end(), [&](const WallLine& other) {
                         return other.high < kLeastHigh && are_faces(all[i], other);
                       });
-    if (!high && (!rays_known || is_looked_over(walls[i], rasters[i]))) return false;
+    if (rays_known ? looked_over(walls[i], rasters[i]) > (high ? kOverHigh : kOver) : !high) return false;
     return walls[i].length() >= kLongest_m || !stands_before_wall(walls[i], walls);
   });
+}
+
+/// Drops sides that hang at a jamb like a leaf and have no other face behind them as walls have.
+void drop_leaves(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, const Cut& cut) {
+  if (!cut.rays_known) return;
+  std::vector<bool> leaf(walls.size(), false);
+  for (std::size_t i = 0; i < walls.size(); ++i) {
+    const WallLine& side = walls[i];
+    if (side.length() < kShortestLeaf_m || side.length() > kWidestLeaf_m) continue;
+    if (std::any_of(walls.begin(), walls.end(), [&](const auto& other) { return are_faces(side, other); }))
+      continue;
+    for (std::size_t w = 0; w < walls.size() && !leaf[i]; ++w)
+      leaf[i] = w != i && (hangs_at(side, side.s0, walls[w], rasters[w], cut) ||
+                           hangs_at(side, side.s1, walls[w], rasters[w], cut));
+  }
+  keep_sides(walls, rasters, [&](std::size_t i) { return !leaf[i]; });
 }
 
 /// Drops short sides that nothing connects to a wall.

@@ -154,6 +154,8 @@ void take_back_doors(std::vector<WallDoor>& doors, std::vector<WallLine>& walls)
           wall.openings.begin(), wall.openings.end(), [&, low = s0, high = s1](const WallOpening& part) {
             return std::min(part.s1, high) - std::max(part.s0, low) <= 0.5 * (part.s1 - part.s0);
           });
+      for (auto part = first_of; part != wall.openings.end(); ++part)
+        part->to_floor = door.kind != OpeningKind::kWindow;
       wall.gaps.insert(wall.gaps.end(), first_of, wall.openings.end());
       wall.openings.erase(first_of, wall.openings.end());
       std::sort(wall.gaps.begin(), wall.gaps.end(),

@@ -276,7 +276,8 @@ std::vector<Side> sides_on(const evaluate::SurfaceSamples& samples, const evalua
 bool covers(const WallLine& large, const WallLine& small) {
   constexpr double kApart_m = 0.12;
   constexpr double kShare = 0.6;
-  if (large.normal.dot(small.normal) < 0.985) return false;
+  constexpr double kShort_m = 0.6;  // of which the direction is not known well
+  if (large.normal.dot(small.normal) < (small.length() < kShort_m ? kWallAlike : 0.985)) return false;
   const double middle = 0.5 * (small.s0 + small.s1);
   if (std::abs(large.normal.dot(small.at(middle)) - large.offset_m) > kApart_m) return false;
   const double a = large.along().dot(small.at(small.s0));

@@ -28,6 +28,15 @@ void measure_heights(const cloud::Cloud& cloud, double floor_m, std::vector<Wall
 std::vector<std::vector<Eigen::Vector2d>> furniture_outlines(const cloud::Cloud& cloud, double floor_m,
                                                              const std::vector<WallLine>& walls);
 
+/// The height of the cut over the floor, metres, and the heights between which a column must be free to be
+/// part of a door.
+struct Cut {
+  double at_m;
+  double low_m;
+  double high_m;
+  bool rays_known;
+};
+
 /// Drops tall sides that are not walls: cameras looked over them, or they stand in front of a wall. Without
 /// rays only what reaches high is known to be a wall.
 void drop_furniture(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, bool rays_known);
@@ -37,6 +46,8 @@ void drop_low_furniture(std::vector<WallLine>& walls);
 /// right angle, nor continue along a line.
 void drop_loose_sides(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters);
 
+/// Drops leaves of doors that stand open.
+void drop_leaves(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, const Cut& cut);
 /// Moves ends that meet no wall to the line of a wall that passes within a few centimetres of them, where
 /// that wall was hidden.
 void meet_hidden_walls(std::vector<WallLine>& walls);
@@ -50,15 +61,6 @@ constexpr double kNarrowestDoor_m = 0.55;
 constexpr double kWidestDoor_m = 2.0;     ///< of two leaves
 constexpr double kWidestPassage_m = 3.0;  ///< of which both jambs were seen, else it is a gap
 constexpr double kThickestWall_m = 0.45;
-
-/// The height of the cut over the floor, metres, and the heights between which a column must be free to be
-/// part of a door.
-struct Cut {
-  double at_m;
-  double low_m;
-  double high_m;
-  bool rays_known;
-};
 
 /// Drops sides that the cut passes over or below, and finds the gaps of the others.
 void cut_sides(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, const Cut& cut);
@@ -87,6 +89,10 @@ void find_far_sides(const std::vector<WallLine>& walls, std::vector<WallDoor>& d
 /// Openings between the free end of a wall and the wall that its line meets next, which are the rest of it.
 std::vector<WallDoor> doors_at_free_ends(const std::vector<WallLine>& walls,
                                          const std::vector<WallDoor>& doors);
+/// Openings wider than doors between two faces that lie on one line, which are no more than unseen wall
+/// unless both their jambs were seen.
+std::vector<WallDoor> passages_in_line(const std::vector<WallLine>& walls,
+                                       const std::vector<WallDoor>& doors);
 /// Hinges of doors whose leaves were seen.
 void find_leaves(const cloud::Cloud& cloud, double floor_m, const std::vector<WallLine>& walls,
                  std::vector<WallDoor>& doors);

@@ -45,32 +45,37 @@ Eigen::AlignedBox2d box_of(const std::vector<WallLine>& walls) {
   return {box.min() - margin, box.max() + margin};
 }
 
+/// Adds a candidate for an opening if both its jambs are seen in the cloud, and it is no window and none of
+/// those that are known; true: it was added.
+bool add_if_seen(const cloud::Cloud& cloud, double floor_m, const WallDoor& candidate, WallPlan& plan) {
+  constexpr double kSame_m = 0.3;
+  std::vector<WallDoor> measured{candidate};
+  measure_doors(cloud, floor_m, measured);
+  const WallDoor& m = measured.front();
+  const bool again = std::any_of(plan.doors.begin(), plan.doors.end(), [&](const WallDoor& other) {
+    return (other.jambs[0] + other.jambs[1] - m.jambs[0] - m.jambs[1]).norm() <
+           2.0 * (kSame_m + other.depth_m());
+  });
+  const bool seen = !again && m.kind != OpeningKind::kWindow && m.jamb_seen[0] && m.jamb_seen[1] &&
+                    m.width_m > kNarrowestDoor_m;
+  if (seen) plan.doors.push_back(m);
+  return seen;
+}
+
 /// Adds openings at free ends of walls whose jambs were both seen, and gives the lines that close the others.
 std::vector<WallLine> close_free_ends(const cloud::Cloud& cloud, double floor_m, WallPlan& plan) {
-  constexpr double kSame_m = 0.3;
+  // Between two faces of one wall there may also be wall that was not seen
+  std::vector<WallDoor> wide = passages_in_line(plan.walls, plan.doors);
+  find_far_sides(plan.walls, wide);
+  for (const WallDoor& door : wide) add_if_seen(cloud, floor_m, door, plan);
+
+  // The rest of a wall, up to the next, is an opening or is taken to be closed
   std::vector<WallDoor> at_ends = doors_at_free_ends(plan.walls, plan.doors);
   find_far_sides(plan.walls, at_ends);
   std::vector<WallLine> closings;
-
-  // Each candidate is measured in the cloud
   for (const WallDoor& door : at_ends) {
-    std::vector<WallDoor> measured{door};
-    measure_doors(cloud, floor_m, measured);
-    const WallDoor& m = measured.front();
-    const bool again = std::any_of(plan.doors.begin(), plan.doors.end(), [&](const WallDoor& other) {
-      return (other.jambs[0] + other.jambs[1] - m.jambs[0] - m.jambs[1]).norm() <
-             2.0 * (kSame_m + other.depth_m());
-    });
-
-    // Both jambs must have been seen
-    if (!again && m.kind != OpeningKind::kWindow && m.jamb_seen[0] && m.jamb_seen[1] &&
-        m.width_m > kNarrowestDoor_m) {
-      plan.doors.push_back(m);
-    } else {
-      closings.push_back(closing_of(door));
-    }
+    if (!add_if_seen(cloud, floor_m, door, plan)) closings.push_back(closing_of(door));
   }
-
   return closings;
 }
 
@@ -243,8 +248,9 @@ core::Result<WallPlan> find_walls(const PlanInput& of, const core::Executor& exe
 
   // Views decide between walls and furniture
   drop_furniture(plan.walls, rasters, plan.rays_known);
-  drop_loose_sides(plan.walls, rasters);
   const Cut cut = cut_at(of.cut_m, plan.rays_known);
+  drop_leaves(plan.walls, rasters, cut);
+  drop_loose_sides(plan.walls, rasters);
   cut_sides(plan.walls, rasters, cut);
   if (plan.walls.empty()) return plan;
 

@@ -20,6 +20,7 @@ namespace plumbline::plans {
 struct WallOpening {
   double s0 = 0.0;
   double s1 = 0.0;
+  bool to_floor = false;  ///< cameras looked through it below where a window has its sill
 };
 
 /// One side of a wall, seen from above: places p with normal . p = offset, from s0 to s1 along its direction.

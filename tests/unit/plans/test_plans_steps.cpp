@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <vector>
 
 #include "room_cells.hpp"
@@ -114,6 +115,57 @@ TEST(PlanOpenings, EndWhereASlidingLeafHidesTheWall) {
   const auto found = openings_between(wall_with_hole(1.7, 0.0, 0.8), -4.0, 0.0, cut);
   ASSERT_EQ(found.size(), 1U);
   EXPECT_NEAR(found.front().s1 - found.front().s0, 0.9, 0.05);
+}
+
+/// A side at y = 0, 2 m long and seen up to `top_m`, over which cameras looked or not.
+WallRaster side_up_to(double top_m, bool looked_over) {
+  WallRaster raster(Eigen::Vector2d::UnitY(), 0.0, -3.0, 1.0, 0.0);  // s = -x
+  for (double x = 0.01; x < 2.0; x += 0.01) {
+    for (double z = 0.025; z < top_m; z += 0.025) raster.add_surface({x, 0.0, z});
+    maps::ViewRays ray;
+    ray.origin = {x, 2.0, 1.4};
+    ray.ends = {Eigen::Vector3d(x, -0.5, top_m + 0.3).cast<float>()};
+    if (looked_over) raster.add_rays(ray);
+  }
+  return raster;
+}
+
+TEST(PlanFurniture, IsWhatCamerasLookedOver) {
+  for (const bool looked_over : {false, true}) {
+    std::vector<WallLine> walls = {face({2, 0}, {0, 0})};
+    std::vector<WallRaster> rasters = {side_up_to(1.8, looked_over)};
+    drop_furniture(walls, rasters, true);
+    EXPECT_EQ(walls.empty(), looked_over) << "the upper part of a wall may be unseen";
+    EXPECT_EQ(rasters.size(), walls.size());
+  }
+}
+
+TEST(PlanFurniture, LeavesHangAtAJambOfAnOpeningOfTheirWidth) {
+  const Cut cut{1.2, 0.9, 2.0, true};
+  for (const auto& [x, length, leaf] : {std::tuple(1.02, 0.88, true), std::tuple(1.88, 0.75, true),
+                                        std::tuple(1.02, 1.25, false), std::tuple(2.6, 0.88, false)}) {
+    std::vector<WallLine> walls = {face({4, 0}, {0, 0}), face({x, 0.03}, {x, length})};
+    std::vector<WallRaster> rasters = {wall_with_hole(0.9, 0.0, 0.0), side_up_to(2.0, false)};
+    drop_leaves(walls, rasters, cut);
+    EXPECT_EQ(walls.size(), leaf ? 1U : 2U) << x << ", " << length;
+  }
+}
+
+TEST(PlanFurniture, SidesWithAnotherFaceBehindAreWallsBesideADoor) {
+  std::vector<WallLine> walls = {face({4, 0}, {0, 0}), face({1.02, 0.03}, {1.02, 0.88}),
+                                 face({0.92, 0.88}, {0.92, 0.03})};
+  std::vector<WallRaster> rasters = {wall_with_hole(0.9, 0.0, 0.0), side_up_to(2.0, false),
+                                     side_up_to(2.0, false)};
+  drop_leaves(walls, rasters, {1.2, 0.9, 2.0, true});
+  EXPECT_EQ(walls.size(), 3U);
+}
+
+TEST(PlanOpenings, WideOnesLieBetweenFacesInLine) {
+  const std::vector<WallLine> walls = {face({0, 0}, {1, 0}), face({3.5, 0}, {5, 0}), face({8.2, 0}, {9, 0}),
+                                       face({0, 0.1}, {1.2, 0.1})};
+  const std::vector<WallDoor> found = passages_in_line(walls, {});
+  ASSERT_EQ(found.size(), 1U) << "neither wider than 3 m nor between lines";
+  EXPECT_NEAR(found[0].width_m, 2.5, 1e-9);
 }
 
 TEST(PlanRooms, CloseOverShortGapsOnly) {
