@@ -19,6 +19,8 @@ double mean_share(int a, int b, const Share& share) {
   return sum / std::max(1, b - a + 1);
 }
 
+constexpr double kLeastCrossedColumn = 0.08;  ///< of a column from 0.3 to 1.9 m that cameras looked through
+
 bool open_column(const WallRaster& raster, int column, const Cut& cut) {
   constexpr double kMost = 0.25;
   return raster.seen(column, 0.25, 0.8) <= kMost && raster.seen(column, cut.low_m, cut.high_m) <= kMost;
@@ -40,11 +42,33 @@ bool is_passage(const WallRaster& raster, int a, int b, const Cut& cut) {
   return mean_share(a, b, [&](int c) { return raster.seen(c, 2.15, 2.5); }) >= kLeastLintel;
 }
 
+/// Splits runs of open columns where no ray crossed the middle of one: there may be wall between two
+/// openings.
+std::vector<std::pair<int, int>> split_where_unseen(const WallRaster& raster,
+                                                    const std::vector<std::pair<int, int>>& runs) {
+  constexpr int kLongest = 15;  // columns, 30 cm: what a post or a thing before the opening hides
+  std::vector<std::pair<int, int>> parts;
+  for (const auto& [a, b] : runs) {
+    int first = a, crossed = -1;  // column that was crossed last
+    for (int c = a; c <= b; ++c) {
+      if (raster.crossed(c, 0.3, 1.9) < kLeastCrossedColumn) continue;
+      if (crossed >= 0 && c - crossed > kLongest) {
+        parts.emplace_back(first, crossed);
+        first = c;
+      }
+      crossed = c;
+    }
+    parts.emplace_back(first, b);
+  }
+  return parts;
+}
+
 /// Narrows a run of columns to those that cameras looked through: a sliding leaf before the wall hides the
 /// part beside its opening, which shows no surface either.
 void trim_hidden(const WallRaster& raster, const Cut& cut, int& a, int& b) {
   const auto is_hidden = [&](int c) {
-    return raster.hidden(c, 0.3, 1.9) > raster.crossed(c, 0.3, 1.9) && raster.crossed(c, 0.3, 1.9) < 0.08;
+    return raster.hidden(c, 0.3, 1.9) > raster.crossed(c, 0.3, 1.9) &&
+           raster.crossed(c, 0.3, 1.9) < kLeastCrossedColumn;
   };
   if (!cut.rays_known) return;
   while (a < b && is_hidden(a)) ++a;
@@ -171,7 +195,7 @@ std::vector<WallOpening> openings_between(const WallRaster& raster, double s0, d
 
   // Widths of doors only
   std::vector<WallOpening> openings;
-  for (auto [a, b] : runs) {
+  for (auto [a, b] : cut.rays_known ? split_where_unseen(raster, runs) : runs) {
     trim_hidden(raster, cut, a, b);
     const WallOpening opening{raster.start_of(a), raster.start_of(b + 1)};
     const double width = opening.s1 - opening.s0;
@@ -349,6 +373,20 @@ WallLine closing_of(const WallDoor& door) {
 
 namespace {
 
+/// True if cameras looked through everywhere between two places of a wall: where they did not, there may be
+/// wall.
+bool is_looked_through(const WallRaster& front, const Eigen::Vector2d& from, const Eigen::Vector2d& to,
+                       const Cut& cut) {
+  constexpr double kLongest_m = 0.3;  // of what a post or a thing before the opening hides
+  const int first = front.column_at(from), last = front.column_at(to);
+  double unseen_m = 0.0;
+  for (int c = first; c <= last && unseen_m < kLongest_m; ++c) {
+    const bool open = open_column(front, c, cut) && front.crossed(c, 0.3, 1.9) >= kLeastCrossedColumn;
+    unseen_m = open ? 0.0 : unseen_m + WallRaster::kWidth_m;
+  }
+  return unseen_m < kLongest_m && is_passage(front, first, last, cut);
+}
+
 /// True if the end of a wall's face is beside a door of that wall.
 bool is_at_door(const WallLine& wall, const Eigen::Vector2d& end, const std::vector<WallDoor>& doors) {
   constexpr double kBeside_m = 0.3;
@@ -415,23 +453,25 @@ std::vector<WallDoor> doors_at_free_ends(const std::vector<WallLine>& walls,
 }
 
 /// Openings wider than doors between two faces that lie on one line and end there, if not at a jamb.
-std::vector<WallDoor> passages_in_line(const std::vector<WallLine>& walls,
-                                       const std::vector<WallDoor>& doors) {
+std::vector<WallDoor> passages_in_line(const std::vector<WallLine>& walls, const std::vector<Fronts>& fronts,
+                                       const Cut& cut, const std::vector<WallDoor>& doors) {
   constexpr double kSameLine_m = 0.025;
   const auto ends_there = [&](const WallLine& wall, std::size_t end) {
     return wall.corner[end] < 0 ||
            walls[static_cast<std::size_t>(wall.corner[end])].length() < kThickestWall_m;
   };
   std::vector<WallDoor> found;
-  for (const WallLine& a : walls) {
-    for (const WallLine& b : walls) {
-      if (&a == &b || !ends_there(a, 1) || !ends_there(b, 0) || a.normal.dot(b.normal) < 0.998) continue;
+  for (std::size_t i = 0; i < walls.size(); ++i) {
+    for (std::size_t j = 0; j < walls.size(); ++j) {
+      const WallLine &a = walls[i], &b = walls[j];
+      if (i == j || !ends_there(a, 1) || !ends_there(b, 0) || a.normal.dot(b.normal) < 0.998) continue;
 
       // Ends of both that look at each other
       const Eigen::Vector2d from = a.at(a.s1), to = b.at(b.s0);
       const double gap = a.along().dot(to - from);
       if (gap <= kWidestDoor_m || gap > kWidestPassage_m || is_at_door(a, from, doors) ||
-          std::abs(a.normal.dot(to - from)) > kSameLine_m)
+          std::abs(a.normal.dot(to - from)) > kSameLine_m ||
+          !is_looked_through(*fronts[i].last, from, to, cut))
         continue;
       WallDoor door;
       door.jambs = {from, to};

@@ -21,18 +21,21 @@ bool in_line(const WallLine& a, const WallLine& b) {
 /// Share of a side's columns, of those that reach at least as high as tall furniture, over whose upper edge
 /// cameras looked. No ray passes over a wall's edge, however little of its upper part was seen.
 double looked_over(const WallLine& side, const WallRaster& raster) {
-  constexpr double kLeastTop_m = 1.5;
+  constexpr double kTop_m = 1.5;
   constexpr double kGap_m = 0.1;
   constexpr double kAbove_m = 0.6;
+  const double least_m = std::min(kTop_m, side.top_m - kGap_m);  // less where a part of a wall was seen
   int columns = 0, over = 0;
   for (int c = raster.column_of(side.s0); c <= raster.column_of(side.s1); ++c) {
     const double top = raster.top(c);
-    if (top < kLeastTop_m) continue;
+    if (top < least_m) continue;
     ++columns;
     if (raster.crossed(c, top + kGap_m, top + kAbove_m) > 0.0) ++over;
   }
   return columns > 0 ? static_cast<double>(over) / columns : 0.0;
 }
+
+bool is_mostly_high(const WallLine& side) { return side.high > 0.5; }
 
 /// True if walls that face the same way run a little behind the side: along most of it, so that they were
 /// seen over it; one that is longer; or two parts of one, to the left and to the right, of which the side
@@ -187,6 +190,13 @@ void drop_loose_sides(std::vector<WallLine>& walls, std::vector<WallRaster>& ras
   keep_sides(walls, rasters, [&](std::size_t i) {
     // Long sides need no support
     if (walls[i].length() >= kShort_m) return true;
+
+    // Pieces of one wall support each other where furniture does not reach, whatever their direction
+    const bool in_pieces =
+        is_mostly_high(walls[i]) && std::any_of(walls.begin(), walls.end(), [&](const auto& other) {
+          return &other != &walls[i] && is_mostly_high(other) && in_line(walls[i], other);
+        });
+    if (in_pieces) return true;
     if (is_askew(walls[i], walls)) return false;
 
     // Corners at both ends support a side

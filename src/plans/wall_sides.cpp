@@ -13,7 +13,7 @@
 #include "plumbline/evaluate/wall_planes.hpp"
 #include "plumbline/evaluate/wall_thickness.hpp"
 #include "plumbline/plans/plan.hpp"
-#include "wall_raster.hpp"
+#include "wall_steps.hpp"
 
 namespace plumbline::plans {
 namespace {
@@ -174,6 +174,15 @@ bool is_tall(const WallRaster& raster, const std::pair<int, int>& run, double ne
          look.at_cut > kLeastAtCut;
 }
 
+/// True if a run may be a part of a wall of which the upper part was not seen.
+bool reaches_cut(const WallRaster& raster, const std::pair<int, int>& run, double cut_m) {
+  constexpr double kLeastTall = 0.2;
+  constexpr double kLeastAtCut = 0.1;
+  const RunLook look = look_of(raster, run, cut_m, cut_m);
+  return (run.second - run.first + 1) * WallRaster::kWidth_m >= kShortestWall_m && look.high >= kLeastTall &&
+         look.at_cut > kLeastAtCut;
+}
+
 /// True if a run may be one face of a wall that is no higher than furniture: seen from its foot to the cut.
 bool is_low_wall(const WallRaster& raster, const std::pair<int, int>& run, double cut_m) {
   constexpr double kFoot_m = 0.1;
@@ -245,9 +254,16 @@ std::vector<Side> sides_on(const evaluate::SurfaceSamples& samples, const evalua
                     along.dot(own.back().head<2>()), 0.0);
   for (const Eigen::Vector3d& p : own) raster.add_surface(p);
 
+  // In line with a long wall another part of it need not be tall
+  constexpr double kLong_m = 1.5;
   std::vector<Side> sides;
-  for (const auto& run : filled_runs(raster)) {
-    const bool tall = is_tall(raster, run, need_m, cut_m);
+  const auto runs = filled_runs(raster);
+  const bool any_long = std::any_of(runs.begin(), runs.end(), [&](const auto& run) {
+    return (run.second - run.first + 1) * WallRaster::kWidth_m >= kLong_m &&
+           is_tall(raster, run, need_m, cut_m);
+  });
+  for (const auto& run : runs) {
+    const bool tall = is_tall(raster, run, need_m, cut_m) || (any_long && reaches_cut(raster, run, cut_m));
     if (!tall && !is_low_wall(raster, run, cut_m)) continue;
     Side side;
     side.line = base;
@@ -284,6 +300,29 @@ bool covers(const WallLine& large, const WallLine& small) {
   const double b = large.along().dot(small.at(small.s1));
   const double common = std::min(large.s1, std::max(a, b)) - std::max(large.s0, std::min(a, b));
   return common > kShare * small.length();
+}
+
+/// Turns short pieces, of which the direction is not known well, into that of the wall's longer other face.
+void align_short_faces(std::vector<WallLine>& walls) {
+  constexpr double kShort_m = 0.6, kThinnest_m = 0.06, kShare = 0.6;
+  constexpr double kAlike = 0.95;  // cosine of 18 degrees
+  const std::vector<WallLine> all = walls;
+  for (WallLine& side : walls) {
+    const Eigen::Vector2d middle = side.at(0.5 * (side.s0 + side.s1));
+    const double half = 0.5 * side.length();
+    if (2.0 * half >= kShort_m) continue;
+    const auto face = std::find_if(all.begin(), all.end(), [&](const WallLine& other) {
+      const double behind = other.offset_m - other.normal.dot(middle), s = other.along().dot(middle);
+      const double common = std::min(other.s1, s + half) - std::max(other.s0, s - half);
+      return other.length() > 2.0 * half && other.normal.dot(side.normal) < -kAlike && behind > kThinnest_m &&
+             behind < kThickestWall_m && common > kShare * 2.0 * half;
+    });
+    if (face == all.end()) continue;
+    side.normal = -face->normal;
+    side.offset_m = side.normal.dot(middle);
+    side.s0 = side.along().dot(middle) - half;
+    side.s1 = side.along().dot(middle) + half;
+  }
 }
 
 }  // namespace
@@ -346,6 +385,7 @@ std::vector<WallLine> wall_sides(const cloud::Cloud& cloud, double floor_m, doub
     if (!covered) walls.push_back(side.line);
   }
 
+  align_short_faces(walls);
   return walls;
 }
 

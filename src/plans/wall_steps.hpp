@@ -89,10 +89,10 @@ void find_far_sides(const std::vector<WallLine>& walls, std::vector<WallDoor>& d
 /// Openings between the free end of a wall and the wall that its line meets next, which are the rest of it.
 std::vector<WallDoor> doors_at_free_ends(const std::vector<WallLine>& walls,
                                          const std::vector<WallDoor>& doors);
-/// Openings wider than doors between two faces that lie on one line, which are no more than unseen wall
-/// unless both their jambs were seen.
-std::vector<WallDoor> passages_in_line(const std::vector<WallLine>& walls,
-                                       const std::vector<WallDoor>& doors);
+/// Openings wider than doors between two faces that lie on one line. They are no more than unseen wall unless
+/// both their jambs were seen.
+std::vector<WallDoor> passages_in_line(const std::vector<WallLine>& walls, const std::vector<Fronts>& fronts,
+                                       const Cut& cut, const std::vector<WallDoor>& doors);
 /// Hinges of doors whose leaves were seen.
 void find_leaves(const cloud::Cloud& cloud, double floor_m, const std::vector<WallLine>& walls,
                  std::vector<WallDoor>& doors);

@@ -20,7 +20,7 @@ std::vector<WallRaster> rasters_of(const std::vector<WallLine>& walls, const clo
   std::vector<WallRaster> rasters;
   rasters.reserve(walls.size());
   for (const WallLine& wall : walls)
-    rasters.emplace_back(wall.normal, wall.offset_m, wall.s0 - kWidestDoor_m, wall.s1 + kWidestDoor_m,
+    rasters.emplace_back(wall.normal, wall.offset_m, wall.s0 - kWidestPassage_m, wall.s1 + kWidestPassage_m,
                          floor_m);
   for (const cloud::Point& p : cloud) {
     if (!(std::abs(p.normal_z) < 0.4F)) continue;
@@ -62,14 +62,15 @@ bool add_if_seen(const cloud::Cloud& cloud, double floor_m, const WallDoor& cand
   return seen;
 }
 
+/// Adds passages between two faces on one line whose jambs were both seen.
+void add_passages(const PlanInput& of, const std::vector<Fronts>& fronts, const Cut& cut, WallPlan& plan) {
+  std::vector<WallDoor> wide = passages_in_line(plan.walls, fronts, cut, plan.doors);
+  find_far_sides(plan.walls, wide);
+  for (const WallDoor& door : wide) add_if_seen(of.points, of.floor_m, door, plan);
+}
+
 /// Adds openings at free ends of walls whose jambs were both seen, and gives the lines that close the others.
 std::vector<WallLine> close_free_ends(const cloud::Cloud& cloud, double floor_m, WallPlan& plan) {
-  // Between two faces of one wall there may also be wall that was not seen
-  std::vector<WallDoor> wide = passages_in_line(plan.walls, plan.doors);
-  find_far_sides(plan.walls, wide);
-  for (const WallDoor& door : wide) add_if_seen(cloud, floor_m, door, plan);
-
-  // The rest of a wall, up to the next, is an opening or is taken to be closed
   std::vector<WallDoor> at_ends = doors_at_free_ends(plan.walls, plan.doors);
   find_far_sides(plan.walls, at_ends);
   std::vector<WallLine> closings;
@@ -258,6 +259,7 @@ core::Result<WallPlan> find_walls(const PlanInput& of, const core::Executor& exe
   const std::vector<Fronts> fronts = join_sides(of, executor, cut, rasters, plan.walls);
   add_doors(of, fronts, cut, plan);
   if (plan.rays_known) {
+    add_passages(of, fronts, cut, plan);
     add_open_rooms(of, space, plan);
   } else {
     plan.rooms = rooms_of(plan.walls);

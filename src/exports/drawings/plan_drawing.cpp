@@ -72,6 +72,32 @@ bool is_in_room(const DrawnText& text, const plans::WallRoom& room) {
                      [&](const Eigen::Vector2d& p) { return plans::is_inside(room.outline, p); });
 }
 
+/// Outlines of furniture, and the places that they take from texts.
+struct LabelFurniture {
+  const std::vector<std::vector<Eigen::Vector2d>>& outlines;
+  LabelPlaces lines{Drawing{}};
+
+  [[nodiscard]] bool is_under(const DrawnText& text) const {
+    return !lines.is_free(text) || std::any_of(outlines.begin(), outlines.end(), [&](const auto& outline) {
+      return plans::is_inside(outline, text.at);
+    });
+  }
+};
+
+/// Puts a text at the nearest free place to its room's label, over furniture only if no other is free. False:
+/// none is.
+bool place_in_room(const plans::WallRoom& room, const LabelFurniture& furniture, double mm,
+                   LabelPlaces& places, DrawnText& text) {
+  std::vector<Eigen::Vector2d> inside;
+  for (const Eigen::Vector2d& at : places_around(room.label, 2.0 * mm, 80.0 * mm)) {
+    text.at = at;
+    if (!is_in_room(text, room)) continue;
+    if (places.is_free(text) && !furniture.is_under(text)) return places.place(text, {at});
+    inside.push_back(at);
+  }
+  return places.place(text, inside);
+}
+
 }  // namespace
 
 PlanLayers::PlanLayers(Drawing& drawing)
@@ -164,27 +190,25 @@ void draw_labels(const plans::WallPlan& plan, const PlanStyle& style, const Plan
     }
   };
 
-  // A room's number and area where it lies free in the room, smaller if need be, else beside it.
+  LabelFurniture furniture{plan.furniture};
+  for (const auto& outline : plan.furniture) furniture.lines.add(DrawnLine{layers.furniture, outline, true});
+
+  // A room's number and area where it lies free in the room, smaller if need be, else beside it
   for (std::size_t i = 0; i < plan.rooms.size(); ++i) {
     const plans::WallRoom& room = plan.rooms[i];
     const std::string area = fmt::format("{}{} m²", room.closed ? "" : "≥ ", style.number(room.area_m2, 2));
     DrawnText text{layers.area, room.label, 3.0 * style.mm, 0.0, fmt::format("{}: {}", i + 1, area)};
     bool placed = false;
-
     for (const double height_mm : {3.0, 2.2, 1.8}) {
       text.height_m = height_mm * style.mm;
-      std::vector<Eigen::Vector2d> inside;
-      for (const Eigen::Vector2d& at : places_around(room.label, 2.0 * style.mm, 80.0 * style.mm)) {
-        text.at = at;
-        if (is_in_room(text, room)) inside.push_back(at);
-      }
-      placed = places.place(text, inside);
+      placed = place_in_room(room, furniture, style.mm, places, text);
       if (placed) break;
     }
     if (!placed) with_leader(text, room.label, 80.0);
     drawing.texts.push_back(text);
   }
 
+  // Numbers of openings beside them
   for (std::size_t i = 0; i < plan.doors.size(); ++i) {
     const plans::WallDoor& door = plan.doors[i];
     const Eigen::Vector2d middle =

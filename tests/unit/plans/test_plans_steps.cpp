@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <tuple>
 #include <vector>
 
@@ -160,12 +161,40 @@ TEST(PlanFurniture, SidesWithAnotherFaceBehindAreWallsBesideADoor) {
   EXPECT_EQ(walls.size(), 3U);
 }
 
+/// Faces on one line with 2.5 m and 3.2 m between them, and what cameras saw from y > 0 of the gaps, except
+/// from x = 2 m on for `hidden_m`.
+std::vector<WallDoor> wide_passages(double hidden_m) {
+  const std::vector<WallLine> walls = {face({9, 0}, {8.2, 0}), face({5, 0}, {3.5, 0}), face({1, 0}, {0, 0})};
+  const auto raster = std::make_shared<WallRaster>(Eigen::Vector2d::UnitY(), 0.0, -12.0, 3.0, 0.0);  // s = -x
+  for (double x = 0.01; x < 9.0; x += 0.01) {
+    for (double z = 0.025; z < 2.5; z += 0.025) {
+      maps::ViewRays ray;
+      ray.origin = {x, 1.0, z};
+      ray.ends = {Eigen::Vector3d(x, -1.0, z).cast<float>()};
+      const bool wall = x < 1.0 || (x > 3.5 && x < 5.0) || x > 8.2;
+      if (wall) raster->add_surface({x, 0.0, z});
+      if (!wall && !(x > 2.0 && x < 2.0 + hidden_m)) raster->add_rays(ray);
+    }
+  }
+  return passages_in_line(walls, {3, Fronts{raster, raster}}, {1.2, 0.9, 2.0, true}, {});
+}
+
 TEST(PlanOpenings, WideOnesLieBetweenFacesInLine) {
-  const std::vector<WallLine> walls = {face({0, 0}, {1, 0}), face({3.5, 0}, {5, 0}), face({8.2, 0}, {9, 0}),
-                                       face({0, 0.1}, {1.2, 0.1})};
-  const std::vector<WallDoor> found = passages_in_line(walls, {});
-  ASSERT_EQ(found.size(), 1U) << "neither wider than 3 m nor between lines";
+  const std::vector<WallDoor> found = wide_passages(0.0);
+  ASSERT_EQ(found.size(), 1U) << "none is wider than 3 m";
   EXPECT_NEAR(found[0].width_m, 2.5, 1e-9);
+  EXPECT_EQ(wide_passages(0.2).size(), 1U) << "a post";
+  EXPECT_TRUE(wide_passages(0.5).empty()) << "perhaps wall between two doors";
+}
+
+TEST(PlanFurniture, PiecesOfAWallNeedNoLongWall) {
+  for (const double high : {0.0, 1.0}) {
+    std::vector<WallLine> walls = {face({0, 0}, {0.5, 0.07}), face({1.5, 0.21}, {1.9, 0.266})};
+    for (WallLine& wall : walls) wall.high = high;
+    std::vector<WallRaster> rasters(2, side_up_to(2.5, false));
+    drop_loose_sides(walls, rasters);
+    EXPECT_EQ(walls.size(), high > 0.0 ? 2U : 0U);
+  }
 }
 
 TEST(PlanRooms, CloseOverShortGapsOnly) {
