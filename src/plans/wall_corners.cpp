@@ -54,8 +54,10 @@ void add_meetings(const std::vector<WallLine>& walls, std::size_t i, std::size_t
         meetings.push_back({off + std::abs(other_more), i, end, j, other, s, t});
     }
 
-    // An end at the face of a wall is the second choice
-    if (t > walls[j].s0 + kCornerReach_m && t < walls[j].s1 - kCornerReach_m)
+    // An end before the face of a wall is the second choice; behind it, the wall's other face would be met
+    const Eigen::Vector2d middle = walls[i].at(0.5 * (walls[i].s0 + walls[i].s1));
+    const bool before = walls[j].normal.dot(middle) > walls[j].offset_m;
+    if (before && t > walls[j].s0 + kCornerReach_m && t < walls[j].s1 - kCornerReach_m)
       meetings.push_back({off + 2.0 * kCornerReach_m, i, end, j, 2, s, t});
   }
 }

@@ -187,6 +187,15 @@ TEST(PlanOpenings, WideOnesLieBetweenFacesInLine) {
   EXPECT_TRUE(wide_passages(0.5).empty()) << "perhaps wall between two doors";
 }
 
+TEST(PlanCorners, AreBeforeFacesNotBehindThem) {
+  for (const bool before : {true, false}) {  // the side of a shelf that was seen through a door is behind
+    std::vector<WallLine> walls = {face({4, 0}, {0, 0}),
+                                   before ? face({2, 0.1}, {2, 0.6}) : face({2, -0.1}, {2, -0.6})};
+    join_corners(walls);
+    EXPECT_EQ(walls[1].corner[0] >= 0 || walls[1].corner[1] >= 0, before);
+  }
+}
+
 TEST(PlanFurniture, PiecesOfAWallNeedNoLongWall) {
   for (const double high : {0.0, 1.0}) {
     std::vector<WallLine> walls = {face({0, 0}, {0.5, 0.07}), face({1.5, 0.21}, {1.9, 0.266})};
