@@ -19,6 +19,7 @@ double mean_share(int a, int b, const Share& share) {
   return sum / std::max(1, b - a + 1);
 }
 
+constexpr int kLongestUnseen = 15;  ///< columns, 30 cm: what a post or a thing before an opening hides
 constexpr double kLeastCrossedColumn = 0.08;  ///< of a column from 0.3 to 1.9 m that cameras looked through
 
 bool open_column(const WallRaster& raster, int column, const Cut& cut) {
@@ -46,13 +47,12 @@ bool is_passage(const WallRaster& raster, int a, int b, const Cut& cut) {
 /// openings.
 std::vector<std::pair<int, int>> split_where_unseen(const WallRaster& raster,
                                                     const std::vector<std::pair<int, int>>& runs) {
-  constexpr int kLongest = 15;  // columns, 30 cm: what a post or a thing before the opening hides
   std::vector<std::pair<int, int>> parts;
   for (const auto& [a, b] : runs) {
     int first = a, crossed = -1;  // column that was crossed last
     for (int c = a; c <= b; ++c) {
       if (raster.crossed(c, 0.3, 1.9) < kLeastCrossedColumn) continue;
-      if (crossed >= 0 && c - crossed > kLongest) {
+      if (crossed >= 0 && c - crossed > kLongestUnseen) {
         parts.emplace_back(first, crossed);
         first = c;
       }
@@ -75,6 +75,21 @@ void trim_hidden(const WallRaster& raster, const Cut& cut, int& a, int& b) {
   while (b > a && is_hidden(b)) --b;
 }
 
+/// Narrows a run of columns to where rays crossed it, if they left out more than a post or a thing before it
+/// hides.
+void trim_unseen(const WallRaster& raster, const Cut& cut, int& a, int& b) {
+  if (!cut.rays_known) return;
+  int first = b + 1, last = a - 1;  // columns that rays crossed
+  for (int c = a; c <= b; ++c) {
+    if (raster.crossed(c, 0.3, 1.9) < kLeastCrossedColumn) continue;
+    first = std::min(first, c);
+    last = c;
+  }
+  if (first > last) return;
+  if (first - a > kLongestUnseen) a = first;
+  if (b - last > kLongestUnseen) b = last;
+}
+
 /// An opening up to where its wall begins: leaves and frames reach a little into it.
 WallOpening widened(const WallRaster& raster, const WallLine& wall, WallOpening opening, const Cut& cut) {
   const int first = raster.column_at(wall.at(opening.s0));
@@ -82,6 +97,7 @@ WallOpening widened(const WallRaster& raster, const WallLine& wall, WallOpening 
   int a = first;
   int b = last;
   trim_hidden(raster, cut, a, b);
+  trim_unseen(raster, cut, a, b);
   if (a > first || b < last) {
     opening.s0 += (a - first) * WallRaster::kWidth_m;
     opening.s1 -= (last - b) * WallRaster::kWidth_m;
@@ -377,14 +393,13 @@ namespace {
 /// wall.
 bool is_looked_through(const WallRaster& front, const Eigen::Vector2d& from, const Eigen::Vector2d& to,
                        const Cut& cut) {
-  constexpr double kLongest_m = 0.3;  // of what a post or a thing before the opening hides
   const int first = front.column_at(from), last = front.column_at(to);
-  double unseen_m = 0.0;
-  for (int c = first; c <= last && unseen_m < kLongest_m; ++c) {
+  int unseen = 0;
+  for (int c = first; c <= last && unseen <= kLongestUnseen; ++c) {
     const bool open = open_column(front, c, cut) && front.crossed(c, 0.3, 1.9) >= kLeastCrossedColumn;
-    unseen_m = open ? 0.0 : unseen_m + WallRaster::kWidth_m;
+    unseen = open ? 0 : unseen + 1;
   }
-  return unseen_m < kLongest_m && is_passage(front, first, last, cut);
+  return unseen <= kLongestUnseen && is_passage(front, first, last, cut);
 }
 
 /// True if the end of a wall's face is beside a door of that wall.

@@ -187,6 +187,26 @@ TEST(PlanOpenings, WideOnesLieBetweenFacesInLine) {
   EXPECT_TRUE(wide_passages(0.5).empty()) << "perhaps wall between two doors";
 }
 
+TEST(PlanOpenings, BetweenPiecesOfAWallEndWhereNoRayCrossed) {
+  const auto raster = std::make_shared<WallRaster>(Eigen::Vector2d::UnitY(), 0.0, -6.0, 2.0, 0.0);  // s = -x
+  for (double x = 0.01; x < 4.0; x += 0.01) {
+    for (double z = 0.025; z < 2.5; z += 0.025) {
+      maps::ViewRays ray;
+      ray.origin = {x, 1.0, z};
+      ray.ends = {Eigen::Vector3d(x, -1.0, z).cast<float>()};
+      if (x < 1.0 || x > 2.6) raster->add_surface({x, 0.0, z});
+      if (x > 1.0 && x < 1.8 && z < 2.05) raster->add_rays(ray);
+    }
+  }
+  std::vector<WallLine> walls = {face({4, 0}, {2.6, 0}), face({1, 0}, {0, 0})};
+  std::vector<Fronts> fronts(2, Fronts{raster, raster});
+  bridge_gaps(walls, fronts, {1.2, 0.9, 2.0, true});
+  ASSERT_EQ(walls.size(), 1U);
+  ASSERT_EQ(walls[0].openings.size(), 1U);
+  EXPECT_NEAR(walls[0].openings[0].s0, -1.8, 0.05) << "beyond there may be wall that was not seen";
+  EXPECT_NEAR(walls[0].openings[0].s1, -1.0, 0.05);
+}
+
 TEST(PlanCorners, AreBeforeFacesNotBehindThem) {
   for (const bool before : {true, false}) {  // the side of a shelf that was seen through a door is behind
     std::vector<WallLine> walls = {face({4, 0}, {0, 0}),
