@@ -19,7 +19,7 @@ LAYERS = [
     ["dataset", "features", "diagnose", "cloud", "optimize"],
     ["maps"],
     ["tracking", "places", "evaluate", "synth", "viewer", "check"],
-    ["mapping", "inertial"],
+    ["mapping", "inertial", "plans"],
     ["viz", "exports", "localize"],
     ["adjust", "changes"],
     ["pipeline", "report"],

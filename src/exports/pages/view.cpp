@@ -13,13 +13,13 @@
 #include <fstream>
 #include <tuple>
 
+#include "drawings/plan_sheets.hpp"
 #include "formats.hpp"
 #include "pages/compare.hpp"
 #include "pages/placing.hpp"
 #include "pages/seen_from.hpp"
 #include "pages/thumbnails.hpp"
 #include "paths/lines.hpp"
-#include "plans/plan_sheets.hpp"
 #include "plumbline/cloud/columns.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/maps/pose_samples.hpp"
@@ -251,7 +251,7 @@ void add_lines(const MapSource& source, viewer::Scene& scene) {
 void add_plan(MapSource& source, MapView& view) {
   viewer::Scene& scene = view.scene;
   if (!scene.z_up) return;
-  const auto plan = find_walls(source);
+  const auto plan = plan_of(source);
   if (!plan) {
     view.notes.push_back("without a floor plan: " + plan.error().message);
     return;
@@ -260,9 +260,9 @@ void add_plan(MapSource& source, MapView& view) {
   // Faces of walls between their openings
   const double height = source.floor_m() + source.options().cut_m;
   const auto at = [&](const Eigen::Vector2d& p) { return Eigen::Vector3d(p.x(), p.y(), height); };
-  for (const WallLine& wall : plan->walls) {
+  for (const plans::WallLine& wall : plan->walls) {
     double from = wall.s0;
-    for (const WallOpening& opening : wall.openings) {
+    for (const plans::WallOpening& opening : wall.openings) {
       scene.walls.emplace_back(at(wall.at(from)), at(wall.at(opening.s0)));
       from = opening.s1;
     }
@@ -270,14 +270,14 @@ void add_plan(MapSource& source, MapView& view) {
   }
 
   // Windows are not passages
-  for (const WallDoor& door : plan->doors) {
-    if (door.kind == OpeningKind::kWindow) continue;
+  for (const plans::WallDoor& door : plan->doors) {
+    if (door.kind == plans::OpeningKind::kWindow) continue;
     scene.doors.emplace_back(at(0.5 * (door.jambs[0] + door.far_jambs[0])),
                              at(0.5 * (door.jambs[1] + door.far_jambs[1])));
   }
 
   // Areas of rooms, and the plan as a drawing
-  for (const WallRoom& room : plan->rooms)
+  for (const plans::WallRoom& room : plan->rooms)
     scene.rooms.emplace_back(at(room.label),
                              fmt::format("{}{:.2f} m²", room.closed ? "" : "≥ ", room.area_m2));
   scene.plan_height_m = height;

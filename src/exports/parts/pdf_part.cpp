@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-#include "plans/drawing.hpp"
+#include "drawings/drawing.hpp"
 
 namespace plumbline::exports {
 namespace {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <regex>
 
+#include "drawings/drawing.hpp"
 #include "exports/export_test.hpp"
-#include "plans/drawing.hpp"
 
 namespace plumbline::exports {
 namespace {

@@ -7,8 +7,6 @@
 #include <vector>
 
 #include "exports/export_test.hpp"
-#include "plans/room_cells.hpp"
-#include "plans/wall_steps.hpp"
 
 namespace plumbline::exports {
 namespace {
@@ -234,51 +232,6 @@ TEST_F(ExportPlan, LayersAreLeftOutInAllFiles) {
   EXPECT_NE(nothing.error().message.find("door"), std::string::npos) << nothing.error().message;
 }
 
-/// Area of an outline less that of its holes.
-double solid_area(const WallSolid& solid) {
-  double area = 0.0;
-  for (const auto& ring : solid.rings) area += area_of(ring);
-  return area;
-}
-
-TEST(PlanSolids, FillBetweenFacesAndAssumeTheRest) {
-  const auto face = [](const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
-    WallLine wall;  // its front on the right of the way
-    const Eigen::Vector2d along = (to - from).normalized();
-    wall.normal = {along.y(), -along.x()};
-    wall.offset_m = wall.normal.dot(from);
-    wall.s0 = along.dot(from);
-    wall.s1 = along.dot(to);
-    return wall;
-  };
-  WallPlan plan;
-  plan.walls = {face({0, 0}, {4, 0}), face({3, 0.2}, {0, 0.2})};
-  const std::vector<WallSolid> solids = wall_solids(plan, 1.0);
-  ASSERT_EQ(solids.size(), 2U);
-  EXPECT_FALSE(solids[0].assumed);
-  EXPECT_NEAR(solid_area(solids[0]), 3.0 * 0.2, 1e-3);
-  EXPECT_TRUE(solids[1].assumed);
-  EXPECT_NEAR(solid_area(solids[1]), 1.0 * 0.1, 1e-3);
-}
-
-TEST(PlanOpenings, AreTurnedWithThePlan) {
-  WallPlan plan;
-  plan.walls.resize(1);
-  plan.walls[0].offset_m = 2.0;
-  plan.walls[0].s0 = -1.0;
-  plan.walls[0].s1 = 3.0;
-  plan.walls[0].openings = {{0.0, 1.0}};
-  plan.rooms.resize(1);
-  plan.rooms[0].label = {1.0, 2.0};
-  const Eigen::Matrix2d linear = 2.0 * Eigen::Rotation2Dd(0.3).toRotationMatrix();
-  const Eigen::Vector2d origin(500.0, 7000.0);
-  const WallPlan there = moved(plan, linear, origin);
-  for (const auto& [before, after] :
-       {std::pair(-1.0, there.walls[0].s0), std::pair(1.0, there.walls[0].openings[0].s1)})
-    EXPECT_LT((there.walls[0].at(after) - origin - linear * plan.walls[0].at(before)).norm(), 1e-9);
-  EXPECT_LT((there.rooms[0].label - origin - linear * plan.rooms[0].label).norm(), 1e-9);
-}
-
 TEST_F(ExportPlan, SameCloudSameBytes) {
   for (const char* form : {"svg", "pdf", "dxf"}) {
     ASSERT_TRUE(write(request(std::string("a.") + form)));
@@ -315,87 +268,6 @@ TEST_F(ExportPlan, JsonHoldsWhatIsDrawn) {
   EXPECT_EQ(count(json, "\"closed\": true"), 2U);
   EXPECT_EQ(count(json, "\"kind\": \"door\""), 1U);
   EXPECT_EQ(count(json, "\"thickness_m\": 0.12"), 4U) << "two pieces on each side of the wall with the door";
-}
-
-/// A face of a wall, its front on the right of the way.
-WallLine face(const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
-  const Eigen::Vector2d along = (to - from).normalized();
-  WallLine wall;
-  wall.normal = {along.y(), -along.x()};
-  wall.offset_m = wall.normal.dot(from);
-  wall.s0 = along.dot(from);
-  wall.s1 = along.dot(to);
-  return wall;
-}
-
-/// The room of 4 x 3 m whose wall at x = 4 is seen from y = 0 up to a height, looked through from its middle.
-std::vector<WallRoom> room_seen_up_to(double y) {
-  const std::vector<WallLine> walls = {face({0, 0}, {0, 3}), face({0, 3}, {4, 3}), face({4, y}, {4, 0}),
-                                       face({4, 0}, {0, 0})};
-  const Eigen::AlignedBox2d box(Eigen::Vector2d(-1.5, -1.5), Eigen::Vector2d(5.5, 4.5));
-  FreeSpace space(box, 0.0);
-  for (int view = 0; view < 3; ++view) {
-    ViewRays rays;
-    rays.origin = {1.9 + 0.1 * view, 1.5, 1.4};
-    for (int k = 0; k < 720; ++k) {
-      const Eigen::Vector2d way(std::cos(k * M_PI / 360.0), std::sin(k * M_PI / 360.0));
-      const double x = (way.x() > 0 ? 4.0 - rays.origin.x() : -rays.origin.x()) / way.x();
-      const double far = std::min(x, (way.y() > 0 ? 1.5 : -1.5) / way.y());
-      rays.ends.emplace_back((rays.origin + far * Eigen::Vector3d(way.x(), way.y(), 0)).cast<float>());
-    }
-    space.add(rays);
-  }
-  return rooms_in(box, walls, {}, {}, space);
-}
-
-/// The face, at y = 0 and seen from y > 0, of a wall of 4 m with a hole from 1 m to 1 m + `width`. Cameras
-/// look through the hole above `sill_m`; what stands before it hides what is lower, and `leaf_m` of the hole
-/// beside.
-WallRaster wall_with_hole(double width, double sill_m, double leaf_m) {
-  WallRaster raster(Eigen::Vector2d::UnitY(), 0.0, -4.0, 0.0, 0.0);  // s = -x
-  for (double x = 0.01; x < 4.0; x += 0.01) {
-    for (double z = 0.025; z < 2.5; z += 0.025) {
-      const bool hole = x > 1.0 && x < 1.0 + width && z < 2.05;
-      const bool hidden = hole && (z < sill_m || x > 1.0 + width - leaf_m);
-      if (!hole) raster.add_surface({x, 0.0, z});
-      ViewRays ray;
-      ray.origin = {x, 1.0, z};
-      ray.ends = {Eigen::Vector3d(x, hidden ? 0.06 : -1.0, z).cast<float>()};
-      if (hole) raster.add_rays(ray);
-    }
-  }
-  return raster;
-}
-
-TEST(PlanOpenings, AreOpenBelowSillsToo) {
-  const Cut cut{1.2, 0.9, 2.0, true};
-  EXPECT_EQ(openings_between(wall_with_hole(0.9, 0.0, 0.0), -4.0, 0.0, cut).size(), 1U);
-  EXPECT_TRUE(
-      openings_between(wall_with_hole(0.9, 0.85, 0.0), -4.0, 0.0, cut).empty());  // a bed before a window
-}
-
-TEST(PlanOpenings, MayBeWiderThanDoors) {
-  const Cut cut{1.2, 0.9, 2.0, true};
-  EXPECT_EQ(openings_between(wall_with_hole(2.6, 0.0, 0.0), -4.0, 0.0, cut).size(), 1U);
-}
-
-TEST(PlanOpenings, EndWhereASlidingLeafHidesTheWall) {
-  const Cut cut{1.2, 0.9, 2.0, true};
-  const auto found = openings_between(wall_with_hole(1.7, 0.0, 0.8), -4.0, 0.0, cut);
-  ASSERT_EQ(found.size(), 1U);
-  EXPECT_NEAR(found.front().s1 - found.front().s0, 0.9, 0.05);
-}
-
-TEST(PlanRooms, CloseOverShortGapsOnly) {
-  for (const double y : {3.0, 2.5, 1.5}) {
-    const std::vector<WallRoom> rooms = room_seen_up_to(y);
-    ASSERT_EQ(rooms.size(), 1U) << y;
-    EXPECT_NEAR(rooms[0].area_m2, 12.0, 0.01) << y;
-    EXPECT_NEAR(rooms[0].perimeter_m(), 14.0, 0.01) << y;
-    EXPECT_EQ(rooms[0].closed, y > 2.0) << y;
-    const auto gaps = std::count(rooms[0].sides.begin(), rooms[0].sides.end(), RoomSide::kGap);
-    EXPECT_EQ(gaps, y == 2.5 ? 1 : 0) << y;
-  }
 }
 
 }  // namespace
