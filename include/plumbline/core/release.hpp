@@ -3,7 +3,8 @@
 
 namespace plumbline::core {
 
-/// Empties a container and frees its memory, which a vector keeps when {} is assigned to it or clear() is called.
+/// Empties a container and frees its memory, which a vector keeps when {} is assigned to it or clear() is
+/// called.
 template <typename Container>
 void release(Container& container) {
   Container().swap(container);
