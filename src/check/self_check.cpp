@@ -112,7 +112,7 @@ class Check {
   }
   /// An anchor's view; its images are shared and must not be changed.
   core::Result<View> anchor_view(std::size_t a) const {
-    if (a >= kept_.size() || kept_[a].gray.empty()) return view(anchors_[a]);
+    if (a >= kept_.size()) return view(anchors_[a]);
     const PosedFrame& posed = frames_[anchors_[a]];
     return View{&cameras_[posed.frame.way], posed.poses, kept_[a]};
   }

@@ -103,6 +103,8 @@ WallOpening widened(const WallRaster& raster, const WallLine& wall, WallOpening 
     opening.s1 -= (last - b) * WallRaster::kWidth_m;
     return opening;
   }
+
+  // Both ends go on as long as columns are open
   while (a > 0 && open_column(raster, a - 1, cut) && raster.start_of(b) - raster.start_of(a) < kWidestDoor_m)
     --a;
   while (b + 1 < raster.columns() && open_column(raster, b, cut) &&
@@ -316,6 +318,7 @@ std::vector<WallDoor> doors_between_sides(const std::vector<WallLine>& walls,
   std::vector<WallDoor> doors;
   for (std::size_t i = 0; i < walls.size(); ++i) {
     for (std::size_t j = i + 1; j < walls.size(); ++j) {
+      // Two faces of one wall
       const WallLine& a = walls[i];
       const WallLine& b = walls[j];
       const double behind = a.offset_m - a.normal.dot(b.at(0.5 * (b.s0 + b.s1)));
@@ -488,6 +491,7 @@ std::vector<WallDoor> passages_in_line(const std::vector<WallLine>& walls, const
           std::abs(a.normal.dot(to - from)) > kSameLine_m ||
           !is_looked_through(*fronts[i].last, from, to, cut))
         continue;
+
       WallDoor door;
       door.jambs = {from, to};
       door.far_jambs = door.jambs;

@@ -149,11 +149,14 @@ void take_back_doors(std::vector<WallDoor>& doors, std::vector<WallLine>& walls)
       const bool on_near = std::abs(wall.normal.dot(door.jambs[0]) - wall.offset_m) < kOff_m;
       const bool on_far = std::abs(wall.normal.dot(door.far_jambs[0]) - wall.offset_m) < kOff_m;
       if (std::abs(wall.normal.dot(way)) > kSquare || (!on_near && !on_far)) continue;
+
+      // The part of the face between the jambs
       const auto [s0, s1] = std::minmax({wall.along().dot(door.jambs[0]), wall.along().dot(door.jambs[1])});
       const auto first_of = std::stable_partition(
           wall.openings.begin(), wall.openings.end(), [&, low = s0, high = s1](const WallOpening& part) {
             return std::min(part.s1, high) - std::max(part.s0, low) <= 0.5 * (part.s1 - part.s0);
           });
+
       for (auto part = first_of; part != wall.openings.end(); ++part)
         part->to_floor = door.kind != OpeningKind::kWindow;
       wall.gaps.insert(wall.gaps.end(), first_of, wall.openings.end());

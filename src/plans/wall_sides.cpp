@@ -311,6 +311,8 @@ void align_short_faces(std::vector<WallLine>& walls) {
     const Eigen::Vector2d middle = side.at(0.5 * (side.s0 + side.s1));
     const double half = 0.5 * side.length();
     if (2.0 * half >= kShort_m) continue;
+
+    // A longer face behind most of it
     const auto face = std::find_if(all.begin(), all.end(), [&](const WallLine& other) {
       const double behind = other.offset_m - other.normal.dot(middle), s = other.along().dot(middle);
       const double common = std::min(other.s1, s + half) - std::max(other.s0, s - half);
@@ -318,6 +320,8 @@ void align_short_faces(std::vector<WallLine>& walls) {
              behind < kThickestWall_m && common > kShare * 2.0 * half;
     });
     if (face == all.end()) continue;
+
+    // Turned about its middle
     side.normal = -face->normal;
     side.offset_m = side.normal.dot(middle);
     side.s0 = side.along().dot(middle) - half;

@@ -181,6 +181,8 @@ void draw_labels(const plans::WallPlan& plan, const PlanStyle& style, const Plan
       text.at = at;
       if ((at - anchor).norm() < text.width_m() || !places.is_free(text) || !places.is_free(anchor, at))
         continue;
+
+      // The leader ends at the nearer side of the text
       const auto box = box_of(text, 0.25 * text.height_m);
       const Eigen::Vector2d left = 0.5 * (box[0] + box[3]), right = 0.5 * (box[1] + box[2]);
       drawing.line(text.layer, anchor, (left - anchor).norm() < (right - anchor).norm() ? left : right);

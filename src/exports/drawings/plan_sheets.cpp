@@ -93,6 +93,8 @@ core::Result<Drawing> storey_sheet(MapSource& source, const std::string& storey,
   if (!found) return tl::unexpected(found.error());
   const plans::WallPlan plan =
       world ? plans::moved(*found, world->linear().topLeftCorner<2, 2>(), world->origin.head<2>()) : *found;
+
+  // Sentences on what was found, for the user
   const std::vector<std::string> notes = notes_of(plan);
   for (const std::string& note : notes)
     summary.notes.push_back(storey.empty() ? note : "storey " + storey + ": " + note);

@@ -327,6 +327,7 @@ bool put_on_sheet(const SheetOptions& options, const SheetFacts& facts, const Pl
     if (options.paper.empty() && options.scale == 0 && larger && drawing.sheet.scale < kSmallestOnA3)
       continue;
 
+    // Lying or upright, whichever holds the drawing first
     for (const bool upright : {false, true}) {
       drawing.sheet.paper = paper.name;
       drawing.sheet.width_mm = upright ? paper.short_mm : paper.long_mm;

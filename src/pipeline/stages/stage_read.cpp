@@ -102,6 +102,8 @@ class ReadStage : public Stage {
                  : core::input_error(
                        fmt::format("{}: ended before its first frame; nothing is written", source_->name()));
     }
+
+    // The number of frames without a message of their own
     if (unreadable_ > kReportedOneByOne) {
       log_->warning(
           fmt::format("{} of {} frames could not be read and were skipped", unreadable_.load(), io.frame()));
