@@ -296,7 +296,7 @@ class Check {
     }
 
     constexpr double kRefused = 0.3;
-    const GraphReport graph = put_together(anchors, links);
+    GraphReport graph = put_together(anchors, links);
     report.graph_m = graph.rms_m;
     for (std::size_t a = 0; a < anchors_.size(); ++a)
       report.along.push_back({graph.shift_m[a], anchors[a].stamp, anchors[a].way});

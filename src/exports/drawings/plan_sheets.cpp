@@ -97,7 +97,7 @@ core::Result<Drawing> storey_sheet(MapSource& source, const std::string& storey,
   // Sentences on what was found, for the user
   const std::vector<std::string> notes = notes_of(plan);
   for (const std::string& note : notes)
-    summary.notes.push_back(storey.empty() ? note : "storey " + storey + ": " + note);
+    summary.notes.push_back(storey.empty() ? note : fmt::format("storey {}: {}", storey, note));
 
   // The title block tells storey, height of the cut and coordinates
   SheetFacts facts;

@@ -213,6 +213,14 @@ void draw_scale(const Drawing& drawing, SheetWriter& writer, const PlanStyle& st
   writer.text(tip - 12.5, y + 6.0, "y");
 }
 
+/// Whole multiples of a step from `low` on, below `high`.
+std::vector<double> multiples(double step, double low, double high) {
+  const auto first = static_cast<int>(std::ceil(low / step));
+  std::vector<double> values;
+  for (int k = first; k * step < high; ++k) values.push_back(k * step);
+  return values;
+}
+
 /// Crosses each some metres, and their coordinates along the frame of the drawing.
 void draw_coordinates(Drawing& drawing, SheetWriter& writer, const PlanLayers& layers, double right_mm,
                       double top_mm) {
@@ -228,11 +236,10 @@ void draw_coordinates(Drawing& drawing, SheetWriter& writer, const PlanLayers& l
 
   // Values along the lower and the left edge
   for (const int axis : {0, 1}) {
-    for (double value = std::ceil((low[axis] + 2.0 * edge) / step) * step; value < high[axis] - 2.0 * edge;
-         value += step) {
+    for (const double value : multiples(step, low[axis] + 2.0 * edge, high[axis] - 2.0 * edge)) {
       const double along = (value - drawing.sheet.low[axis]) / mm;
       DrawnText text{layers.grid, Eigen::Vector2d::Zero(), kText_mm * mm, axis == 0 ? 0.0 : 0.5 * M_PI,
-                     fmt::format("{:.0f}", value + 0.0)};
+                     fmt::format("{:.0f}", value)};
       text.at = axis == 0 ? writer.at(along, kMargin_mm + 4.0) : writer.at(kLeft_mm + 4.0, along);
       drawing.texts.push_back(text);
 
@@ -245,9 +252,9 @@ void draw_coordinates(Drawing& drawing, SheetWriter& writer, const PlanLayers& l
   }
 
   // Crosses within the drawing
-  const Eigen::Array2d first = ((low.array() + 2.0 * edge) / step).ceil() * step;
-  for (double x = first.x(); x < high.x() - edge; x += step) {
-    for (double y = first.y(); y < high.y() - edge; y += step) {
+  const std::vector<double> ys = multiples(step, low.y() + 2.0 * edge, high.y() - edge);
+  for (const double x : multiples(step, low.x() + 2.0 * edge, high.x() - edge)) {
+    for (const double y : ys) {
       drawing.line(layers.grid, {x - 1.5 * mm, y}, {x + 1.5 * mm, y});
       drawing.line(layers.grid, {x, y - 1.5 * mm}, {x, y + 1.5 * mm});
     }
